@@ -45,7 +45,7 @@ fn sphere(kind: SpringKind, rings: usize) -> Object {
     .unwrap()
 }
 
-/// Time that `work` takes [s], and what it made.
+/// Time that `work` takes (s), and what it made.
 fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
     let made = work();
@@ -57,7 +57,7 @@ fn coordinates(of: impl Fn(usize) -> f64) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(of))
 }
 
-/// Times of a solve with the factor of the object's stiffness, least of some [ms]: this crate's on all cores and on
+/// Times of a solve with the factor of the object's stiffness, least of some (ms): this crate's on all cores and on
 /// one, and faer's on one, with the same order of elimination.
 fn solves(object: &Object, is_isotropic: bool) -> [f64; 3] {
     let (nodes, rows) = (object.rest.len(), if is_isotropic { 1 } else { 3 });

@@ -82,7 +82,7 @@ fn peer(points: &[[f64; 3]], tau: &[f64]) -> Result<(Vec<f64>, serde_json::Value
     Ok((bytes.chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap_or_default())).collect(), report))
 }
 
-/// Peak memory of this process so far [MiB]; zero where the system does not tell.
+/// Peak memory of this process so far (MiB); zero where the system does not tell.
 fn peak_mib() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

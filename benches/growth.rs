@@ -37,7 +37,7 @@ use haptize::{
 use rustix::time::{ClockId, clock_gettime};
 use std::{hint::black_box, path::Path, sync::Arc};
 
-/// Rms errors for which a store is filled, over the rms torque [1].
+/// Rms errors for which a store is filled, over the rms torque (1).
 const AIMS: [f64; 9] = [0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001];
 
 /// Most levels for so many joints: the finest uniform grid has some 10^8 points, or the store no more levels.
@@ -60,13 +60,13 @@ struct Cost {
     nodes: f64,
     bytes: f64,
     error: f64,
-    /// A look-up on a slow way through the store [ns].
+    /// A look-up on a slow way through the store (ns).
     look_up: f64,
-    /// A solved node, its share of all else that filling takes included [us of processor time].
+    /// A solved node, its share of all else that filling takes included (us of processor time).
     node: f64,
 }
 
-/// Processor time of this process [s].
+/// Processor time of this process (s).
 fn processor_time() -> f64 {
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64

@@ -48,18 +48,18 @@ const MEMORY_BOUND: f64 = 0.5;
 /// A dispatch of fewer workgroups leaves most of a GPU idle.
 const FEW_WORKGROUPS: f64 = 128.0;
 
-/// Size of what is copied [B], and how often.
+/// Size of what is copied (B), and how often.
 const COPIED: u64 = 64 << 20;
 const COPIES: usize = 16;
 
-/// Operations in f64 [1], and bytes from the cache [B], of what the search counts. A pair of nodes: a number of C times
+/// Operations in f64 (1), and bytes from the cache (B), of what the search counts. A pair of nodes: a number of C times
 /// three of a force, added up. A bent facet: 400 for its control points, if it is regular, and 1,600 for the point closest
 /// to the proxy node, from a dozen nodes and their displacements. A step of an elimination: a product, subtracted.
 const PAIR: [f64; 2] = [6.0, 8.0];
 const FACET: [f64; 2] = [2_000.0, 800.0];
 const ELIMINATION: [f64; 2] = [2.0, 16.0];
 
-/// Operations in f64 [1/s] and bytes from the second-level cache [B/s] of an H200, by its data sheet and as measured.
+/// Operations in f64 (1/s) and bytes from the second-level cache (B/s) of an H200, by its data sheet and as measured.
 const H200: [f64; 2] = [34e12, 5.5e12];
 
 /// Every so many-th configuration is solved where the host is timed beside a software rasteriser.
@@ -75,7 +75,7 @@ const BUSY_TURNS: usize = 16;
 /// What is known of the adapter beforehand.
 #[derive(Clone, Copy)]
 struct Adapter {
-    /// Bytes that it reads and writes a second when it copies [B/s].
+    /// Bytes that it reads and writes a second when it copies (B/s).
     copying: f64,
     hardware: bool,
 }
@@ -118,7 +118,7 @@ fn kernels(context: &Arc<Context>, scene: &Scene) -> Result<(), Box<dyn Error>> 
     rings.iter().try_for_each(|&rings| frames(context, scene, rings, adapter))
 }
 
-/// Bytes that the device reads and writes a second when it copies [B/s].
+/// Bytes that the device reads and writes a second when it copies (B/s).
 fn copying(context: &Context) -> Result<f64, Box<dyn Error>> {
     let (_, _, device, queue) = context.shared();
     let size = COPIED.min(context.binding_limit());
@@ -285,7 +285,7 @@ fn busy(name: &str) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Time of the host to solve: submitting, reading, settling, assembling, and all but settling [us a configuration].
+/// Time of the host to solve: submitting, reading, settling, assembling, and all but settling (us a configuration).
 fn host_times<S: Stages>(
     solver: &mut GpuSolver<'_, S>,
     configurations: &[JointVector],

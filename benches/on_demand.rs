@@ -2,7 +2,7 @@
 //!
 //!     cargo bench --bench on_demand -- [SCENE [LEVELS [SECONDS [SPEED]]]]
 //!
-//! `SCENE`: by default datasets/organ.toml; `SPEED`: greatest speed of the tip between two places [m/s], by default
+//! `SCENE`: by default datasets/organ.toml; `SPEED`: greatest speed of the tip between two places (m/s), by default
 //! several, which are drawn in out/store. Time is simulated: for each millisecond of the loop the thread that solves
 //! gets a millisecond of processor time, as one that has a core to itself. So other work on the machine changes the
 //! figures little.
@@ -37,20 +37,20 @@ use haptize::{
 use rustix::time::{ClockId, clock_gettime};
 use std::{path::Path, sync::Arc, time::Duration};
 
-/// Greatest speeds of the tip between two places [m/s]. At 0.4 m/s the roll turns faster than the device may
+/// Greatest speeds of the tip between two places (m/s). At 0.4 m/s the roll turns faster than the device may
 /// (`speed_limit`), and the loop stops such a walk with a fault.
 const SPEEDS: [f64; 5] = [0.05, 0.1, 0.15, 0.2, 0.3];
 
-/// Greatest speed of a minimum-jerk motion over its mean [1].
+/// Greatest speed of a minimum-jerk motion over its mean (1).
 const MINIMUM_JERK: f64 = 1.875;
 
-/// Processor time of this thread [s].
+/// Processor time of this thread (s).
 fn processor_time() -> f64 {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Position of the last contact node [m].
+/// Position of the last contact node (m).
 fn tip(chain: &Chain, q: &[f64]) -> glam::DVec3 {
     chain.node_position(&chain.links(q), chain.nodes.len() - 1)
 }
@@ -220,9 +220,9 @@ impl World<'_> {
 
 /// What a session showed.
 struct Seen {
-    /// Rms error over the rms torque, as felt [1].
+    /// Rms error over the rms torque, as felt (1).
     felt: f64,
-    /// Greatest changes of the torque in a tick: as felt, and of direct solves [N m].
+    /// Greatest changes of the torque in a tick: as felt, and of direct solves (N m).
     steepest: f64,
     exact: f64,
 }

@@ -72,7 +72,7 @@ enum Extent {
     Measured,
 }
 
-/// Processor time of a configuration [us].
+/// Processor time of a configuration (us).
 struct Times {
     /// What any number of threads can do at once.
     shared: f64,
@@ -108,7 +108,7 @@ fn bake(scene: &Scene, extent: Extent) -> Result<Times, Box<dyn Error>> {
     Ok(Times { shared: each(shared), beside: each(beside), alone: each(alone), behind: each(own - beside - alone) })
 }
 
-/// Processor time so far [s].
+/// Processor time so far (s).
 fn time(clock: ClockId) -> f64 {
     let time = clock_gettime(clock);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
@@ -117,9 +117,9 @@ fn time(clock: ClockId) -> f64 {
 /// A backend, and how long the thread that calls it works while others solve, and while they do not.
 struct Watched<'a> {
     backend: CpuBackend<'a>,
-    /// [s]
+    /// (s)
     beside: f64,
-    /// How long it works while nobody solves [s].
+    /// How long it works while nobody solves (s).
     alone: f64,
 }
 
@@ -128,9 +128,9 @@ struct Counted<'w> {
     work: &'w mut dyn Work,
     /// Chunks that are out.
     out: usize,
-    /// Since when there are some [s].
+    /// Since when there are some (s).
     since: f64,
-    /// How long there were some [s].
+    /// How long there were some (s).
     beside: f64,
 }
 

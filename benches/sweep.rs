@@ -262,7 +262,7 @@ fn curves(root: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
     draw(root, nodes, contacts, free_points)
 }
 
-/// The least time that `work` takes [s], and what it gives.
+/// The least time that `work` takes (s), and what it gives.
 fn quickest<T>(mut work: impl FnMut() -> T) -> (f64, T) {
     let mut time = || {
         let start = Instant::now();

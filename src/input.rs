@@ -6,8 +6,8 @@ use std::{
     path::Path,
 };
 
-/// Greatest number in SI units that a device or a dataset may give for a position [rad or m], a torque [N m] or an
-/// energy [J]. Nothing that is haptized comes near it, and its square times any gain is still far from overflow, so
+/// Greatest number in SI units that a device or a dataset may give for a position (rad or m), a torque (N m) or an
+/// energy (J). Nothing that is haptized comes near it, and its square times any gain is still far from overflow, so
 /// that no account or torque of the haptic loop can become infinite.
 pub(crate) const GREATEST_INPUT: f64 = 1e9;
 

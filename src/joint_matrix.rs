@@ -2,7 +2,7 @@
 
 use crate::joint_vector::MAX_JOINTS;
 
-/// One number per pair of joints, the same for (k, l) and (l, k): a tangent stiffness [N m/rad], an inertia [kg m^2].
+/// One number per pair of joints, the same for (k, l) and (l, k): a tangent stiffness (N m/rad), an inertia (kg m^2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointMatrix {
     len: usize,

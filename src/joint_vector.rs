@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 /// Most joints a virtual proxy may have.
 pub const MAX_JOINTS: usize = 6;
 
-/// One number per joint: angles [rad] (or lengths [m] of prismatic joints), rates, or torques [N m] (forces [N]).
+/// One number per joint: angles (rad) (or lengths (m) of prismatic joints), rates, or torques (N m) (forces (N)).
 #[derive(Clone, Copy, Default, PartialEq)]
 pub struct JointVector {
     len: usize,

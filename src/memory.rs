@@ -8,13 +8,13 @@
     .needed.div_ceil(1_000_000), .left / 1_000_000
 )]
 pub struct Shortage {
-    /// Memory that is needed [bytes].
+    /// Memory that is needed (bytes).
     pub needed: usize,
-    /// Memory that is left [bytes].
+    /// Memory that is left (bytes).
     pub left: usize,
 }
 
-/// Memory below which it is not worth to ask beforehand [bytes]: asking takes as long as to take it.
+/// Memory below which it is not worth to ask beforehand (bytes): asking takes as long as to take it.
 pub const SMALL: usize = 1 << 24;
 
 /// Checks that `needed` bytes are left; passes where the system does not tell.
@@ -29,7 +29,7 @@ pub fn check(needed: usize) -> Result<(), Shortage> {
 }
 
 /// Returns the memory that this process may still take: the least of what the system has available, swap included, of
-/// what the limit on its address space leaves, and of what its control group leaves [bytes].
+/// what the limit on its address space leaves, and of what its control group leaves (bytes).
 #[must_use]
 pub fn left() -> Option<usize> {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
@@ -39,7 +39,7 @@ pub fn left() -> Option<usize> {
     [system, space, group].into_iter().flatten().min()
 }
 
-/// Memory below which drivers and libraries have been seen to fail without saying why [bytes].
+/// Memory below which drivers and libraries have been seen to fail without saying why (bytes).
 const SCARCE: usize = 1 << 29;
 
 /// Returns that little memory is left, for messages of what fails without saying why: empty where there is enough.
@@ -55,13 +55,13 @@ pub fn scarcity() -> String {
     }
 }
 
-/// Returns the most memory that this process has taken so far, if the system reports it [bytes].
+/// Returns the most memory that this process has taken so far, if the system reports it (bytes).
 #[must_use]
 pub fn greatest() -> Option<usize> {
     kilobytes(&std::fs::read_to_string("/proc/self/status").unwrap_or_default(), "VmHWM")
 }
 
-/// Number behind `key` in a text of lines such as `MemFree:  123 kB` [bytes].
+/// Number behind `key` in a text of lines such as `MemFree:  123 kB` (bytes).
 fn kilobytes(text: &str, key: &str) -> Option<usize> {
     let line = text.lines().find_map(|line| line.strip_prefix(key))?;
     let number: usize = line.trim_start_matches(':').trim().trim_end_matches("kB").trim().parse().ok()?;

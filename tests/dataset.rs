@@ -14,7 +14,7 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-/// Greatest single allocation of this test program [bytes].
+/// Greatest single allocation of this test program (bytes).
 static GREATEST: AtomicUsize = AtomicUsize::new(0);
 
 struct Watched;

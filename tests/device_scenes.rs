@@ -110,7 +110,7 @@ fn baked(scene: &Scene) -> Dataset {
     dataset
 }
 
-/// The scene is baked, and pressed and scraped by a device of at most `most` [N m].
+/// The scene is baked, and pressed and scraped by a device of at most `most` (N m).
 fn feels(name: &str, most: f64) {
     let scene = Scene::load(shipped(name)).unwrap();
     let dataset = baked(&scene);
@@ -154,7 +154,7 @@ fn a_pantograph_beyond_a_smaller_grid_is_free_or_held() {
 /// the limits: the proxy enters the object nowhere that was not solved, and a hand in the object is pushed back wherever
 /// it is.
 fn beyond_a_grid(name: &str, grid: &[&str]) {
-    /// Depth from which a hand must feel something [m]: well beyond a cell's error of where contact begins.
+    /// Depth from which a hand must feel something (m): well beyond a cell's error of where contact begins.
     const DEEP: f64 = 0.004;
     let text = std::fs::read_to_string(shipped(name)).unwrap();
     let (before, after) = text.split_once("axes = [\n").unwrap();

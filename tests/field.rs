@@ -57,7 +57,7 @@ fn field(scene: &Scene, data: &Dataset, interpolation: Interpolation) -> TorqueF
     TorqueField::interpolated(data, interpolation, scene.haptics.threshold, &scene.haptics.boundary_slope).unwrap()
 }
 
-/// Root mean square of the error of `field` over `exact` [N m].
+/// Root mean square of the error of `field` over `exact` (N m).
 fn error(field: &TorqueField, exact: &[(JointVector, JointVector)]) -> f64 {
     let square = |(q, tau): &(JointVector, JointVector)| {
         field.sample(q).torque.iter().zip(tau.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>()

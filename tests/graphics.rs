@@ -38,7 +38,7 @@ fn effects(factor: f64) -> [GraphicsEffects; 4] {
     ]
 }
 
-/// Forces of about `size` [N] that change from frame to frame.
+/// Forces of about `size` (N) that change from frame to frame.
 fn push(nodes: usize, frame: usize, size: f64) -> Vec<DVec3> {
     (0..nodes).map(|k| size * DVec3::new(0.1, 0.02 * (k % 3) as f64, -(((k + frame) % 7) as f64))).collect()
 }

@@ -16,7 +16,7 @@ use haptize::{
 use std::fmt::Write;
 
 const YOUNG: f64 = 2e4;
-/// Ground stiffness that keeps the solid in place and hardly adds to it [N/m].
+/// Ground stiffness that keeps the solid in place and hardly adds to it (N/m).
 const LIGHT: f64 = 1e-4;
 
 fn spec(shape: Shape, poisson: f64, cell: Option<f64>, inclusions: Vec<InclusionSpec>) -> ObjectSpec {

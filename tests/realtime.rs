@@ -120,7 +120,7 @@ fn the_real_time_loop_allocates_nothing() {
 struct Called {
     hand: SimulatedHand,
     rate: f64,
-    /// Size of the torque that it was given last [N m].
+    /// Size of the torque that it was given last (N m).
     last: Arc<Mutex<f64>>,
 }
 

@@ -89,7 +89,7 @@ fn a_translation_costs_the_foundation_alone() {
     assert!(object.stiffness.energy(&turn) > 1.01 * bare.stiffness.energy(&turn));
 }
 
-/// Bending stiffness at which the foundation of 1 N/m^3 still leaves the factorisation its digits [N m].
+/// Bending stiffness at which the foundation of 1 N/m^3 still leaves the factorisation its digits (N m).
 const BENDING: f64 = 1e-3;
 
 /// Energies of the displacement `harmonic` of degree l along x, whose mean square over the sphere is given, in units of
@@ -165,7 +165,7 @@ fn every_term_is_positive_semidefinite_on_obtuse_meshes() {
     }
 }
 
-/// Displacement of node 0 under a force on it [m/N].
+/// Displacement of node 0 under a force on it (m/N).
 fn compliance(object: &Object) -> f64 {
     let mut displacement = vec![DVec3::ZERO; object.rest.len()];
     displacement[0] = DVec3::Z;

@@ -12,7 +12,7 @@ use std::fmt::Write;
 
 const YOUNG: f64 = 2e4;
 const POISSON: f64 = 0.3;
-/// Ground stiffness that keeps the solid in place and hardly adds to it [N/m].
+/// Ground stiffness that keeps the solid in place and hardly adds to it (N/m).
 const LIGHT: f64 = 1e-4;
 
 fn spec(shape: Shape, material: Material, ground: GroundSpec) -> ObjectSpec {

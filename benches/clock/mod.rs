@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-/// Median over `blocks` of the mean time of `work` in each, which is done `count` times and gets its number [ns].
+/// Median over `blocks` of the mean time of `work` in each, which is done `count` times and gets its number (ns).
 pub fn nanoseconds(blocks: u32, count: u32, mut work: impl FnMut(f64)) -> f64 {
     let mut means: Vec<f64> = (0..blocks)
         .map(|block| {

@@ -71,9 +71,9 @@ typedef struct hz_solver hz_solver;
 typedef struct hz_sample {
   // sizeof(hz_sample).
   size_t size;
-  // Torque on the arm, one entry per joint, then zeros [N m; N at prismatic joints].
+  // Torque on the arm, one entry per joint, then zeros (N m; N at prismatic joints).
   double torque[HZ_MAX_JOINTS];
-  // Energy that the object stores [J]; zero where the dataset does not tell it.
+  // Energy that the object stores (J); zero where the dataset does not tell it.
   double energy;
   // Share of the grid points around that are in contact, 0 to 1.
   double index;
@@ -88,11 +88,11 @@ typedef struct hz_sample {
 typedef struct hz_gains {
   // sizeof(hz_gains).
   size_t size;
-  // Stiffness of the virtual coupling at each joint [N m/rad; N/m].
+  // Stiffness of the virtual coupling at each joint (N m/rad; N/m).
   double coupling_stiffness[HZ_MAX_JOINTS];
-  // Damping of the virtual coupling at each joint [N m s/rad; N s/m].
+  // Damping of the virtual coupling at each joint (N m s/rad; N s/m).
   double coupling_damping[HZ_MAX_JOINTS];
-  // Greatest torque of each joint, in size [N m; N].
+  // Greatest torque of each joint, in size (N m; N).
   double torque_limit[HZ_MAX_JOINTS];
 } hz_gains;
 
@@ -100,11 +100,11 @@ typedef struct hz_gains {
 typedef struct hz_tick {
   // sizeof(hz_tick).
   size_t size;
-  // Position of the virtual proxy, one entry per joint, then zeros [rad; m].
+  // Position of the virtual proxy, one entry per joint, then zeros (rad; m).
   double proxy[HZ_MAX_JOINTS];
-  // Contact torque on the proxy [N m; N].
+  // Contact torque on the proxy (N m; N).
   double contact_torque[HZ_MAX_JOINTS];
-  // Energy that the object stores [J]; zero where the dataset does not tell it.
+  // Energy that the object stores (J); zero where the dataset does not tell it.
   double energy;
   // 1 in contact, else 0.
   uint32_t contact;
@@ -118,13 +118,13 @@ typedef struct hz_tick {
 typedef struct hz_equilibrium {
   // sizeof(hz_equilibrium).
   size_t size;
-  // Torque on the arm, one entry per joint, then zeros [N m; N at prismatic joints].
+  // Torque on the arm, one entry per joint, then zeros (N m; N at prismatic joints).
   double torque[HZ_MAX_JOINTS];
-  // Energy that object and contact store [J].
+  // Energy that object and contact store (J).
   double energy;
-  // Smallest signed distance of the arm's nodes to the surface at rest [m].
+  // Smallest signed distance of the arm's nodes to the surface at rest (m).
   double gap;
-  // Relative imbalance of forces [1].
+  // Relative imbalance of forces (1).
   double residual;
   // 0 free, 1 in contact, 2 not converged, 3 more contacts than there is room for.
   uint32_t status;
@@ -138,7 +138,7 @@ typedef struct hz_equilibrium {
 typedef struct hz_force {
   // Number of the node.
   size_t node;
-  // Force on it [N].
+  // Force on it (N).
   double force[3];
 } hz_force;
 
@@ -174,13 +174,13 @@ void hz_field_close(struct hz_field *field);
 // `field` is NULL or open.
 uint32_t hz_field_joints(const struct hz_field *field);
 
-// Tells the grid's ends, one entry per joint each [rad; m at prismatic joints]. Real-time safe.
+// Tells the grid's ends, one entry per joint each (rad; m at prismatic joints). Real-time safe.
 //
 // Pointers:
 // `field` is NULL or open; `least` and `greatest` are NULL or have one entry per joint.
 hz_code hz_field_bounds(const struct hz_field *field, double *least, double *greatest);
 
-// Looks up the torque `tau` [N m; N at prismatic joints] at the configuration `q` [rad; m], one entry per joint each.
+// Looks up the torque `tau` (N m; N at prismatic joints) at the configuration `q` (rad; m), one entry per joint each.
 // Real-time safe: it allocates, locks and prints nothing, waits for nothing, and takes the same time wherever `q` is.
 // Any number of threads may call it.
 //
@@ -191,7 +191,7 @@ hz_code hz_field_bounds(const struct hz_field *field, double *least, double *gre
 // `field` is NULL or open; `q` and `tau` are NULL or have one entry per joint.
 hz_code hz_field_torque(const struct hz_field *field, const double *q, double *tau);
 
-// Looks up all that the field knows of the configuration `q` [rad; m]. Real-time safe as hz_field_torque, with the
+// Looks up all that the field knows of the configuration `q` (rad; m). Real-time safe as hz_field_torque, with the
 // same codes.
 //
 // Pointers:
@@ -231,13 +231,13 @@ void hz_loop_close(struct hz_loop *loop);
 // `loop` is NULL or open.
 uint32_t hz_loop_joints(const struct hz_loop *loop);
 
-// Returns the time between two ticks for which the gains are meant [s]; 0 for NULL.
+// Returns the time between two ticks for which the gains are meant (s); 0 for NULL.
 //
 // Pointers:
 // `loop` is NULL or open.
 double hz_loop_period(const struct hz_loop *loop);
 
-// Begins at the device's position `y`, one entry per joint [rad; m]: before the first tick, and to end a fault. The
+// Begins at the device's position `y`, one entry per joint (rad; m): before the first tick, and to end a fault. The
 // torque goes on from what the device is under, so that there is no jump. Real-time safe: it allocates, locks and
 // prints nothing, and waits for nothing.
 //
@@ -247,8 +247,8 @@ double hz_loop_period(const struct hz_loop *loop);
 // `loop` is NULL or open; `y` is NULL or has one entry per joint.
 hz_code hz_loop_start(struct hz_loop *loop, const double *y);
 
-// Does one tick: `tau` is what the device is to exert until the next one [N m; N], for its position `y` [rad; m], one
-// entry per joint each. `age` is the time since that was measured [s], `dt` the time since the tick before [s].
+// Does one tick: `tau` is what the device is to exert until the next one (N m; N), for its position `y` (rad; m), one
+// entry per joint each. `age` is the time since that was measured (s), `dt` the time since the tick before (s).
 // `tick`, which may be NULL, is told the rest. Real-time safe: it allocates, locks and prints nothing, and waits for
 // nothing.
 //
@@ -290,7 +290,7 @@ void hz_solver_close(struct hz_solver *solver);
 // `solver` is NULL or open.
 uint32_t hz_solver_joints(const struct hz_solver *solver);
 
-// Solves the equilibrium at the configuration `q`, one entry per joint [rad; m], from the object at rest. `forces`,
+// Solves the equilibrium at the configuration `q`, one entry per joint (rad; m), from the object at rest. `forces`,
 // which may be NULL, is told as many contact forces as it has room for, `room`; `equilibrium` tells how many there
 // are. Takes some tenths of a millisecond and more, and allocates: not for the real-time thread.
 //

@@ -20,9 +20,9 @@ pub struct hz_field {
 pub struct hz_sample {
     /// sizeof(hz_sample).
     pub size: usize,
-    /// Torque on the arm, one entry per joint, then zeros [N m; N at prismatic joints].
+    /// Torque on the arm, one entry per joint, then zeros (N m; N at prismatic joints).
     pub torque: [f64; HZ_MAX_JOINTS],
-    /// Energy that the object stores [J]; zero where the dataset does not tell it.
+    /// Energy that the object stores (J); zero where the dataset does not tell it.
     pub energy: f64,
     /// Share of the grid points around that are in contact, 0 to 1.
     pub index: f64,
@@ -85,7 +85,7 @@ pub unsafe extern "C" fn hz_field_joints(field: *const hz_field) -> u32 {
     unsafe { field.as_ref() }.map_or(0, |field| field.field.joints() as u32)
 }
 
-/// Tells the grid's ends, one entry per joint each [rad; m at prismatic joints]. Real-time safe.
+/// Tells the grid's ends, one entry per joint each (rad; m at prismatic joints). Real-time safe.
 ///
 /// # Safety
 /// `field` is NULL or open; `least` and `greatest` are NULL or have one entry per joint.
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn hz_field_bounds(field: *const hz_field, least: *mut f64
     hz_code::HZ_OK
 }
 
-/// Looks up the torque `tau` [N m; N at prismatic joints] at the configuration `q` [rad; m], one entry per joint each.
+/// Looks up the torque `tau` (N m; N at prismatic joints) at the configuration `q` (rad; m), one entry per joint each.
 /// Real-time safe: it allocates, locks and prints nothing, waits for nothing, and takes the same time wherever `q` is.
 /// Any number of threads may call it.
 ///
@@ -132,7 +132,7 @@ pub unsafe extern "C" fn hz_field_torque(field: *const hz_field, q: *const f64, 
     })
 }
 
-/// Looks up all that the field knows of the configuration `q` [rad; m]. Real-time safe as hz_field_torque, with the
+/// Looks up all that the field knows of the configuration `q` (rad; m). Real-time safe as hz_field_torque, with the
 /// same codes.
 ///
 /// # Safety

@@ -31,11 +31,11 @@ pub struct hz_loop {
 pub struct hz_gains {
     /// sizeof(hz_gains).
     pub size: usize,
-    /// Stiffness of the virtual coupling at each joint [N m/rad; N/m].
+    /// Stiffness of the virtual coupling at each joint (N m/rad; N/m).
     pub coupling_stiffness: [f64; HZ_MAX_JOINTS],
-    /// Damping of the virtual coupling at each joint [N m s/rad; N s/m].
+    /// Damping of the virtual coupling at each joint (N m s/rad; N s/m).
     pub coupling_damping: [f64; HZ_MAX_JOINTS],
-    /// Greatest torque of each joint, in size [N m; N].
+    /// Greatest torque of each joint, in size (N m; N).
     pub torque_limit: [f64; HZ_MAX_JOINTS],
 }
 
@@ -45,11 +45,11 @@ pub struct hz_gains {
 pub struct hz_tick {
     /// sizeof(hz_tick).
     pub size: usize,
-    /// Position of the virtual proxy, one entry per joint, then zeros [rad; m].
+    /// Position of the virtual proxy, one entry per joint, then zeros (rad; m).
     pub proxy: [f64; HZ_MAX_JOINTS],
-    /// Contact torque on the proxy [N m; N].
+    /// Contact torque on the proxy (N m; N).
     pub contact_torque: [f64; HZ_MAX_JOINTS],
-    /// Energy that the object stores [J]; zero where the dataset does not tell it.
+    /// Energy that the object stores (J); zero where the dataset does not tell it.
     pub energy: f64,
     /// 1 in contact, else 0.
     pub contact: u32,
@@ -140,7 +140,7 @@ pub unsafe extern "C" fn hz_loop_joints(r#loop: *const hz_loop) -> u32 {
     unsafe { r#loop.as_ref() }.map_or(0, |of| of.haptics.joints() as u32)
 }
 
-/// Returns the time between two ticks for which the gains are meant [s]; 0 for NULL.
+/// Returns the time between two ticks for which the gains are meant (s); 0 for NULL.
 ///
 /// # Safety
 /// `loop` is NULL or open.
@@ -150,7 +150,7 @@ pub unsafe extern "C" fn hz_loop_period(r#loop: *const hz_loop) -> f64 {
     unsafe { r#loop.as_ref() }.map_or(0.0, |of| of.haptics.period())
 }
 
-/// Begins at the device's position `y`, one entry per joint [rad; m]: before the first tick, and to end a fault. The
+/// Begins at the device's position `y`, one entry per joint (rad; m): before the first tick, and to end a fault. The
 /// torque goes on from what the device is under, so that there is no jump. Real-time safe: it allocates, locks and
 /// prints nothing, and waits for nothing.
 ///
@@ -175,8 +175,8 @@ pub unsafe extern "C" fn hz_loop_start(r#loop: *mut hz_loop, y: *const f64) -> h
     })
 }
 
-/// Does one tick: `tau` is what the device is to exert until the next one [N m; N], for its position `y` [rad; m], one
-/// entry per joint each. `age` is the time since that was measured [s], `dt` the time since the tick before [s].
+/// Does one tick: `tau` is what the device is to exert until the next one (N m; N), for its position `y` (rad; m), one
+/// entry per joint each. `age` is the time since that was measured (s), `dt` the time since the tick before (s).
 /// `tick`, which may be NULL, is told the rest. Real-time safe: it allocates, locks and prints nothing, and waits for
 /// nothing.
 ///

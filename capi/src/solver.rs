@@ -25,13 +25,13 @@ pub struct hz_solver {
 pub struct hz_equilibrium {
     /// sizeof(hz_equilibrium).
     pub size: usize,
-    /// Torque on the arm, one entry per joint, then zeros [N m; N at prismatic joints].
+    /// Torque on the arm, one entry per joint, then zeros (N m; N at prismatic joints).
     pub torque: [f64; HZ_MAX_JOINTS],
-    /// Energy that object and contact store [J].
+    /// Energy that object and contact store (J).
     pub energy: f64,
-    /// Smallest signed distance of the arm's nodes to the surface at rest [m].
+    /// Smallest signed distance of the arm's nodes to the surface at rest (m).
     pub gap: f64,
-    /// Relative imbalance of forces [1].
+    /// Relative imbalance of forces (1).
     pub residual: f64,
     /// 0 free, 1 in contact, 2 not converged, 3 more contacts than there is room for.
     pub status: u32,
@@ -50,7 +50,7 @@ unsafe impl Extensible for hz_equilibrium {}
 pub struct hz_force {
     /// Number of the node.
     pub node: usize,
-    /// Force on it [N].
+    /// Force on it (N).
     pub force: [f64; 3],
 }
 
@@ -97,7 +97,7 @@ pub unsafe extern "C" fn hz_solver_joints(solver: *const hz_solver) -> u32 {
     unsafe { solver.as_ref() }.map_or(0, |solver| solver.direct.joints() as u32)
 }
 
-/// Solves the equilibrium at the configuration `q`, one entry per joint [rad; m], from the object at rest. `forces`,
+/// Solves the equilibrium at the configuration `q`, one entry per joint (rad; m), from the object at rest. `forces`,
 /// which may be NULL, is told as many contact forces as it has room for, `room`; `equilibrium` tells how many there
 /// are. Takes some tenths of a millisecond and more, and allocates: not for the real-time thread.
 ///

@@ -95,7 +95,7 @@ impl Dataset {
         python_of(py, &self.dataset.grid.axes)
     }
 
-    /// Coordinates of the grid lines of each joint [rad; m].
+    /// Coordinates of the grid lines of each joint (rad; m).
     #[getter]
     fn lines(&self, py: Python<'_>) -> PyResult<Vec<Py<PyArrayDyn<f64>>>> {
         let lines = |axis: &dataset::Axis| {
@@ -104,21 +104,21 @@ impl Dataset {
         self.dataset.grid.axes.iter().map(lines).collect()
     }
 
-    /// Torque tau [N m; N at prismatic joints], the grid's shape and one entry per joint.
+    /// Torque tau (N m; N at prismatic joints), the grid's shape and one entry per joint.
     #[getter]
     fn torque<'py>(slf: &Bound<'py, Self>) -> PyResult<View<'py, f64>> {
         let this = slf.get();
         view(slf, &this.dataset.torque, &this.shape_with(Some(this.dataset.grid.joints())))
     }
 
-    /// Energy that object and contact store [J], or None.
+    /// Energy that object and contact store (J), or None.
     #[getter]
     fn energy<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<View<'py, f64>>> {
         let this = slf.get();
         this.dataset.energy.as_ref().map(|column| view(slf, column, &this.shape_with(None))).transpose()
     }
 
-    /// Smallest signed distance of the arm to the surface at rest, or far from contact a lower bound of it [m]; or
+    /// Smallest signed distance of the arm to the surface at rest, or far from contact a lower bound of it (m); or
     /// None.
     #[getter]
     fn gap<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<View<'py, f32>>> {
@@ -133,7 +133,7 @@ impl Dataset {
         view(slf, &this.dataset.status, &this.shape_with(None))
     }
 
-    /// Relative imbalance of forces [1], or None.
+    /// Relative imbalance of forces (1), or None.
     #[getter]
     fn residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<View<'py, f32>>> {
         let this = slf.get();
@@ -148,7 +148,7 @@ impl Dataset {
     }
 
     /// Contact forces as compressed rows, or None: those of grid point p (C order) are entries offsets[p] to
-    /// offsets[p + 1] of `nodes`, the object's node, and `forces` [N], three numbers each.
+    /// offsets[p + 1] of `nodes`, the object's node, and `forces` (N), three numbers each.
     #[getter]
     #[allow(clippy::type_complexity)]
     fn contacts<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<(View<'py, u64>, View<'py, u32>, View<'py, f32>)>> {
@@ -162,7 +162,7 @@ impl Dataset {
         )))
     }
 
-    /// The object's surface at rest, or None: nodes [m], three numbers each, and triangles, three node numbers each.
+    /// The object's surface at rest, or None: nodes (m), three numbers each, and triangles, three node numbers each.
     #[getter]
     fn surface<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<(View<'py, f64>, View<'py, u32>)>> {
         let this = slf.get();
@@ -179,7 +179,7 @@ impl Dataset {
         &self.dataset.scene
     }
 
-    /// Where the dataset comes from: version, algorithm, tolerance [1], backend, adapter, date, and the error that the
+    /// Where the dataset comes from: version, algorithm, tolerance (1), backend, adapter, date, and the error that the
     /// bake measured.
     #[getter]
     fn provenance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

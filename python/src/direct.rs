@@ -29,14 +29,14 @@ impl Solver {
         Ok(Self { direct: built.map_err(|error| errors::bake(&error))? })
     }
 
-    /// Solve the configuration q [rad; m], one entry per joint, from the object at rest.
+    /// Solve the configuration q (rad; m), one entry per joint, from the object at rest.
     fn solve(&self, py: Python<'_>, q: &Bound<'_, PyAny>) -> PyResult<Equilibrium> {
         let q = arrays::vector("q", q, self.direct.joints())?;
         let inspection = py.detach(|| self.direct.inspect(&q)).map_err(errors::direct)?;
         Ok(Equilibrium { inspection })
     }
 
-    /// Torques [N m; N] at many configurations, one in each row of the last axis of q, on all cores.
+    /// Torques (N m; N) at many configurations, one in each row of the last axis of q, on all cores.
     fn torque<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let joints = self.direct.joints();
         Configurations::new(q, joints)?.fill(&[joints], None, |q, out: &mut [f64]| {
@@ -74,25 +74,25 @@ impl Equilibrium {
         &self.inspection.status
     }
 
-    /// Torque on the arm [N m; N at prismatic joints].
+    /// Torque on the arm (N m; N at prismatic joints).
     #[getter]
     fn torque(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         arrays::array(py, self.inspection.torque.clone(), &[self.inspection.torque.len()])
     }
 
-    /// Energy that object and contact store [J].
+    /// Energy that object and contact store (J).
     #[getter]
     fn energy(&self) -> f64 {
         self.inspection.energy
     }
 
-    /// Smallest signed distance of the arm's nodes to the surface at rest [m].
+    /// Smallest signed distance of the arm's nodes to the surface at rest (m).
     #[getter]
     fn gap(&self) -> f64 {
         self.inspection.gap
     }
 
-    /// Relative imbalance of forces [1].
+    /// Relative imbalance of forces (1).
     #[getter]
     fn residual(&self) -> f64 {
         self.inspection.residual
@@ -104,31 +104,31 @@ impl Equilibrium {
         self.inspection.iterations
     }
 
-    /// Nodes of the object's surface at rest [m], shape (nodes, 3).
+    /// Nodes of the object's surface at rest (m), shape (nodes, 3).
     #[getter]
     fn rest(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         Self::vectors(py, self.inspection.object_nodes.iter().map(|node| node.rest.to_array()))
     }
 
-    /// How far they have moved [m], shape (nodes, 3).
+    /// How far they have moved (m), shape (nodes, 3).
     #[getter]
     fn displacement(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         Self::vectors(py, self.inspection.object_nodes.iter().map(|node| (node.position - node.rest).to_array()))
     }
 
-    /// Contact forces on them [N], shape (nodes, 3).
+    /// Contact forces on them (N), shape (nodes, 3).
     #[getter]
     fn forces(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         Self::vectors(py, self.inspection.object_nodes.iter().map(|node| node.force.to_array()))
     }
 
-    /// The arm's contact nodes [m], shape (nodes, 3).
+    /// The arm's contact nodes (m), shape (nodes, 3).
     #[getter]
     fn arm(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         Self::vectors(py, self.inspection.proxy_nodes.iter().map(|node| node.position.to_array()))
     }
 
-    /// Contact forces on the arm's nodes [N], shape (nodes, 3).
+    /// Contact forces on the arm's nodes (N), shape (nodes, 3).
     #[getter]
     fn arm_forces(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         let force = |contact: &Contact| contact.force.to_array();

@@ -19,7 +19,7 @@ use std::path::PathBuf;
 ///
 /// Field(dataset, interpolation=None): interpolation is "linear" or "potential"; by default the scene's.
 ///
-/// Each look-up takes a configuration q [rad; m], an array of one entry per joint, or any array of such in its last
+/// Each look-up takes a configuration q (rad; m), an array of one entry per joint, or any array of such in its last
 /// axis, and works on all cores. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a
 /// field.
 #[pyclass(frozen, module = "haptize")]
@@ -75,7 +75,7 @@ impl Field {
         self.dataset.clone_ref(py)
     }
 
-    /// Torque on the arm [N m; N at prismatic joints], of the shape of q; into `out`, an array of float64, where that
+    /// Torque on the arm (N m; N at prismatic joints), of the shape of q; into `out`, an array of float64, where that
     /// is given.
     #[pyo3(signature = (q, out = None))]
     fn torque<'py>(&self, q: &Bound<'py, PyAny>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
@@ -89,7 +89,7 @@ impl Field {
         Ok(configurations.fill(&[joints], out, look_up)?.into_any())
     }
 
-    /// Energy that the object stores [J], one number for each configuration; zero where the dataset does not hold it.
+    /// Energy that the object stores (J), one number for each configuration; zero where the dataset does not hold it.
     fn energy<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();
         Configurations::new(q, joints)?.fill(&[], None, |q, out: &mut [f64]| {
@@ -97,7 +97,7 @@ impl Field {
         })
     }
 
-    /// Signed distance of the arm to the surface at rest [m], interpolated linearly; far from contact a lower bound of
+    /// Signed distance of the arm to the surface at rest (m), interpolated linearly; far from contact a lower bound of
     /// it, and NaN outside the grid. DatasetError where the dataset does not hold it.
     fn gap<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();
@@ -108,7 +108,7 @@ impl Field {
         })
     }
 
-    /// Slope d tau/d q [N m/rad], a matrix for each configuration: entry [k, l] is the change of torque k with joint l.
+    /// Slope d tau/d q (N m/rad), a matrix for each configuration: entry (k, l) is the change of torque k with joint l.
     /// On a face of a grid cell it is the mean of both sides.
     fn gradient<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();

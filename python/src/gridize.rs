@@ -10,9 +10,9 @@ use std::time::SystemTime;
 
 /// Interpolate scattered torques on a uniform grid: linear on Delaunay simplices, absent outside their hull.
 ///
-/// q: configurations [rad; m], shape (n, d). tau: the torque measured at each [N m; N], the same shape. step: the
-/// grid's step [rad; m], one number or one per joint. deviations: standard deviation of each torque, the same shape.
-/// names, units ("rad" or "m"): of the joints. epsilon: torque above which a configuration counts as contact [N m].
+/// q: configurations (rad; m), shape (n, d). tau: the torque measured at each (N m; N), the same shape. step: the
+/// grid's step (rad; m), one number or one per joint. deviations: standard deviation of each torque, the same shape.
+/// names, units ("rad" or "m"): of the joints. epsilon: torque above which a configuration counts as contact (N m).
 /// smooth: smooth torques within their deviation first. interpolation: "linear", or "natural" for two joints.
 #[pyfunction]
 #[pyo3(signature = (

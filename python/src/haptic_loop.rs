@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// The haptic loop of a dataset's scene: the virtual proxy, its coupling to the device, the torque field, and the
 /// watchdog.
 ///
-/// Loop(dataset, gains=None): gains in the place of the scene's, a dict of what [haptics] names, one number for all
+/// Loop(dataset, gains=None): gains in the place of the scene's, a dict of what `[haptics]` names, one number for all
 /// joints or one each: coupling_stiffness, coupling_damping, device_damping, proxy_damping, boundary_slope,
 /// torque_limit, torque_rate_limit, speed_limit.
 ///
@@ -69,13 +69,13 @@ impl Loop {
         self.haptics.joints()
     }
 
-    /// Time between two ticks for which the gains are meant [s].
+    /// Time between two ticks for which the gains are meant (s).
     #[getter]
     fn period(&self) -> f64 {
         self.haptics.period()
     }
 
-    /// Begin at the device's position y [rad; m], or begin anew after a fault; the torque goes on from what the device
+    /// Begin at the device's position y (rad; m), or begin anew after a fault; the torque goes on from what the device
     /// is under.
     fn start(&mut self, y: &Bound<'_, PyAny>) -> PyResult<()> {
         let position = arrays::vector("y", y, self.haptics.joints())?;
@@ -87,10 +87,10 @@ impl Loop {
         started.map_err(|fault| PyValueError::new_err(fault.to_string()))
     }
 
-    /// One tick: returns the torque that the device is to exert until the next [N m; N], in `out` where that is given,
+    /// One tick: returns the torque that the device is to exert until the next (N m; N), in `out` where that is given,
     /// an array of float64.
     ///
-    /// y: the device's position [rad; m]. dt: time since the tick before [s]. age: time since y was measured [s].
+    /// y: the device's position (rad; m). dt: time since the tick before (s). age: time since y was measured (s).
     ///
     /// Whatever is wrong with them makes `fault` a text and lets the torque go to zero, until start; only shapes raise.
     #[pyo3(signature = (y, dt, age = 0.0, out = None))]
@@ -117,13 +117,13 @@ impl Loop {
         Some(self.state.as_ref()?.fault()?.to_string())
     }
 
-    /// Position of the virtual proxy at the last tick [rad; m]; None before the first.
+    /// Position of the virtual proxy at the last tick (rad; m); None before the first.
     #[getter]
     fn proxy<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.vector(py, |output| output.proxy)
     }
 
-    /// Contact torque on the proxy at the last tick [N m; N]; None before the first.
+    /// Contact torque on the proxy at the last tick (N m; N); None before the first.
     #[getter]
     fn contact_torque<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.vector(py, |output| output.sample.torque)

@@ -11,7 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Time between two lines [s]: work of a few seconds prints none.
+/// Time between two lines (s): work of a few seconds prints none.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
 /// How far some work has come.

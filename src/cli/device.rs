@@ -35,7 +35,7 @@ enum What {
 struct Check {
     /// KIND or KIND:PLACE, as `haptize device list` shows it.
     device: Address,
-    /// How long each phase takes [s].
+    /// How long each phase takes (s).
     #[arg(long, default_value_t = 3.0)]
     seconds: f64,
     /// Drive each coordinate in turn with at most a tenth of the device's torque, while the space bar is held.
@@ -43,7 +43,7 @@ struct Check {
     push: bool,
 }
 
-/// Longest phase [s].
+/// Longest phase (s).
 const LONGEST: f64 = 600.0;
 
 /// Time between ticks.

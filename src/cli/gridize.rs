@@ -40,7 +40,7 @@ pub struct Arguments {
     /// joint positions and torques.
     #[arg(required = true)]
     logs: Vec<PathBuf>,
-    /// Grid step [rad or m]: one number, or one a joint, separated by commas.
+    /// Grid step (rad or m): one number, or one a joint, separated by commas.
     #[arg(long, required = true, value_delimiter = ',', num_args = 1, value_name = "H", allow_negative_numbers = true)]
     step: Vec<f64>,
     /// The dataset to write; by default the first log's name in the current folder, ending in .haptize.
@@ -59,7 +59,7 @@ pub struct Arguments {
     /// A scene with the arm and the gains to feel the dataset with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Torque above which a configuration counts as contact [N m]; by default what the scan's scene says, three
+    /// Torque above which a configuration counts as contact (N m); by default what the scan's scene says, three
     /// standard deviations of the samples, or a hundredth of the greatest torque.
     #[arg(long, allow_negative_numbers = true)]
     epsilon: Option<f64>,
@@ -98,7 +98,7 @@ pub struct Source {
     /// The measurements.
     pub samples: Samples,
     scene: String,
-    /// The torque threshold that the scan's scene names [N m].
+    /// The torque threshold that the scan's scene names (N m).
     pub epsilon: Option<f64>,
     /// For the dataset's provenance: `scan`, `simulated scan` or `import`, and of what.
     kind: &'static str,

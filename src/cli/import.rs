@@ -21,10 +21,10 @@ pub struct Arguments {
     /// The link at the end of the arm; its chain to the root becomes the arm.
     #[arg(long, value_name = "LINK")]
     tip: String,
-    /// Hold a joint at a value [rad or m]; a scene has at most six that move. May be given several times.
+    /// Hold a joint at a value (rad or m); a scene has at most six that move. May be given several times.
     #[arg(long, value_name = "JOINT=VALUE", value_parser = lock, allow_hyphen_values = true)]
     lock: Vec<Lock>,
-    /// Least distance between contact nodes on the links' shapes [m].
+    /// Least distance between contact nodes on the links' shapes (m).
     #[arg(long, default_value_t = 0.005, value_name = "METRES", allow_negative_numbers = true)]
     spacing: f64,
     /// Folder that holds the ROS packages that `package://` names, if they are in no folder above the robot's file.

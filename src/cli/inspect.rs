@@ -28,7 +28,7 @@ Examples:
 pub struct Arguments {
     /// A scene or a dataset.
     file: PathBuf,
-    /// The configuration: one coordinate per joint [rad or m], separated by commas, or a percentage of the range that
+    /// The configuration: one coordinate per joint (rad or m), separated by commas, or a percentage of the range that
     /// the grid covers, from 0% at its first line to 100% at its last. Write --q=-0.3,... if the first is negative.
     #[arg(
         long,
@@ -45,14 +45,14 @@ pub struct Arguments {
 /// A coordinate of the configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Coordinate {
-    /// As it is [rad or m].
+    /// As it is (rad or m).
     Absolute(f64),
-    /// Fraction of the grid's range [1].
+    /// Fraction of the grid's range (1).
     Fraction(f64),
 }
 
 impl Coordinate {
-    /// Returns the coordinate [rad or m]; none for a fraction where there is no axis.
+    /// Returns the coordinate (rad or m); none for a fraction where there is no axis.
     fn on(self, axis: Option<&AxisSpec>) -> Option<f64> {
         match self {
             Self::Absolute(q) => Some(q),
@@ -215,7 +215,7 @@ fn efforts(values: &[f64], chain: &Chain) -> String {
     scene::efforts(values, chain.joints.iter().map(|joint| (joint.name.as_str(), joint.kind.unit())))
 }
 
-/// Least weight that is printed: smaller ones would read zero [1].
+/// Least weight that is printed: smaller ones would read zero (1).
 const LEAST_WEIGHT: f64 = 5e-4;
 
 fn numbers(values: &[f64]) -> String {

@@ -7,7 +7,7 @@ use crate::{
 };
 use std::{fmt::Write, path::Path};
 
-/// Configurations at which the error is measured [1]: the rms is to decide whether the aim was kept, and single large
+/// Configurations at which the error is measured (1): the rms is to decide whether the aim was kept, and single large
 /// errors where the torque has kinks and jumps make it vary by a third with a hundred.
 const MEASURED: usize = 400;
 

@@ -13,7 +13,7 @@ use std::{
 /// The system's allocator, which remembers the size of an allocation that failed.
 pub struct Remembering;
 
-/// Size of the last allocation that failed [bytes]; 0 before any did.
+/// Size of the last allocation that failed (bytes); 0 before any did.
 static FAILED: AtomicUsize = AtomicUsize::new(0);
 
 impl Remembering {
@@ -63,7 +63,7 @@ mod answer {
          kept: an unfinished haptize bake or haptize scan goes on with --resume",
     ];
 
-    /// What glibc asks the system for where its heap cannot grow in place [bytes] (`MMAP_AS_MORECORE_SIZE`).
+    /// What glibc asks the system for where its heap cannot grow in place (bytes) (`MMAP_AS_MORECORE_SIZE`).
     const HEAP_STEP: usize = 1 << 20;
 
     /// Whether the system refuses what the C library would ask for.

@@ -36,7 +36,7 @@ use std::{
 /// solved again in the same time. Oftener, and writing would take a share of the processor and the disk that is felt.
 const KEPT_EVERY: Duration = Duration::from_secs(5);
 
-/// Pause after each saving [times that it took]: however large the store, a tenth of one processor at most saves it.
+/// Pause after each saving (times that it took): however large the store, a tenth of one processor at most saves it.
 const PAUSE: u32 = 9;
 
 /// How often the thread that saves looks for a signal.
@@ -75,7 +75,7 @@ pub struct Exploring {
 #[derive(Clone, Copy, Debug)]
 pub struct Explored {
     done: on_demand::Explored,
-    /// From the start of the program's work to the first tick [s].
+    /// From the start of the program's work to the first tick (s).
     start: f64,
 }
 

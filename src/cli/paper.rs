@@ -44,7 +44,7 @@ const BARE: Specimen = Specimen { name: "sponge", scene: include_str!("../../dat
 const FABRIC: Specimen = Specimen { name: "sponge_fabric", scene: include_str!("../../datasets/sponge_fabric.toml") };
 const SIDE: Specimen = Specimen { name: "sponge_side", scene: include_str!("../../datasets/sponge_side.toml") };
 
-/// Interval of the gridized datasets, the paper's [rad].
+/// Interval of the gridized datasets, the paper's (rad).
 const STEP: f64 = 0.03;
 
 /// Instants of Fig. 6.

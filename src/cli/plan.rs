@@ -30,10 +30,10 @@ pub struct Arguments {
     backend: BackendChoice,
 }
 
-/// Memory asked of a scheduler, at least and in steps of [MB]: a job that exceeds it is ended.
+/// Memory asked of a scheduler, at least and in steps of (MB): a job that exceeds it is ended.
 const MEMORY_STEP: usize = 256;
 
-/// Time asked of a scheduler over the predicted one [1]: other machines are slower, and some run other work beside.
+/// Time asked of a scheduler over the predicted one (1): other machines are slower, and some run other work beside.
 const TIME_MARGIN: f64 = 2.0;
 
 /// Samples the scene and states what its shards take. Nothing is written.

@@ -47,14 +47,14 @@ Examples:
 pub struct Arguments {
     /// The dataset's file; with --on-demand a scene.
     dataset: PathBuf,
-    /// Motion of the hand: `press` or `scrape` as in the scene, a CSV file of times [s] and joint coordinates, or joint
+    /// Motion of the hand: `press` or `scrape` as in the scene, a CSV file of times (s) and joint coordinates, or joint
     /// states in MCAP, such as a session that --record wrote.
     #[arg(long, default_value = "press")]
     motion: String,
     /// Topic of the MCAP file that --motion names; by default the hand's of a session, or the only one.
     #[arg(long, value_name = "NAME", conflicts_with = "replay")]
     topic: Option<String>,
-    /// Duration [s]; by default that of the motion.
+    /// Duration (s); by default that of the motion.
     #[arg(long, allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
@@ -92,7 +92,7 @@ pub struct Arguments {
     choices: on_demand::Choices,
 }
 
-/// Longest session [s]: all its ticks are kept in memory, half a gigabyte for each ten minutes at 1 kHz.
+/// Longest session (s): all its ticks are kept in memory, half a gigabyte for each ten minutes at 1 kHz.
 const LONGEST: f64 = 3600.0;
 
 /// Plays the dataset.
@@ -299,7 +299,7 @@ fn perform(
 
 /// How a device is driven.
 struct How<'a> {
-    /// Duration [s].
+    /// Duration (s).
     seconds: f64,
     hold_key: bool,
     exploring: Option<&'a Exploring>,

@@ -17,7 +17,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Variation of a force below which it is reported as steady [1].
+/// Variation of a force below which it is reported as steady (1).
 const STEADY: f64 = 0.25;
 
 /// The result of a playback.

@@ -27,7 +27,7 @@ Examples:
 pub struct Arguments {
     /// The scene. Its grid, if it has one, does not matter.
     scene: PathBuf,
-    /// Depth up to which the grid is to hold contact [m]; by default a fifth of the body's size.
+    /// Depth up to which the grid is to hold contact (m); by default a fifth of the body's size.
     #[arg(long, value_name = "METRES", value_parser = depth)]
     depth: Option<f64>,
     /// Rms error of the torque that the grid is for: a fraction of the torque's own rms over the grid, or a torque
@@ -48,10 +48,10 @@ pub struct Arguments {
 /// Error for which a grid is chosen where nothing else is said: torques are felt to about a tenth.
 const ERROR: &str = "5%";
 
-/// Most points of such a grid [1].
+/// Most points of such a grid (1).
 const POINTS: usize = 2_000_000;
 
-/// Errors over the rms torque whose cost is listed [1].
+/// Errors over the rms torque whose cost is listed (1).
 const ERRORS: [f64; 4] = [0.1, 0.05, 0.02, 0.01];
 
 fn depth(text: &str) -> Result<f64, String> {

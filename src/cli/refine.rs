@@ -18,7 +18,7 @@ use crate::{
 };
 use std::{fmt::Write, path::Path, sync::Arc, time::Instant};
 
-/// Configurations in contact by which the refinement is stopped, and as many others at which its error is measured [1]:
+/// Configurations in contact by which the refinement is stopped, and as many others at which its error is measured (1):
 /// with fewer the rms varies by more than a tenth.
 const JUDGED: usize = 400;
 
@@ -99,8 +99,8 @@ fn uniform(refine: &Refine<'_>) -> usize {
     refine.base.axes.iter().map(|axis| ((axis.count - 1) << (refine.levels - 1)) + 1).product()
 }
 
-/// Prints what the filling is going to take, before it begins; `each` is the time of a node [s], where it is known.
-/// Returns the memory of the store at most [bytes].
+/// Prints what the filling is going to take, before it begins; `each` is the time of a node (s), where it is known.
+/// Returns the memory of the store at most (bytes).
 fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
     let (percent, uniform) = (100.0 * refine.aim, uniform(refine));
     tell(format_args!(

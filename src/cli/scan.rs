@@ -34,7 +34,7 @@ Examples:
   haptize scan sponge.toml --resume
   haptize scan sponge.toml --guided 60")]
 pub struct Arguments {
-    /// The scene's file; its [scan] says where the device goes.
+    /// The scene's file; its `[scan]` says where the device goes.
     scene: PathBuf,
     /// The log to write; by default the scene's name in the current folder, ending in .csv.
     #[arg(short, long)]
@@ -50,7 +50,7 @@ pub struct Arguments {
     /// robot that its own controller moves. Its log comes back by `haptize gridize`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "resume", "guided"])]
     plan_out: Option<PathBuf>,
-    /// How long the trajectory of --plan-out rests at each point [s]; by default the scan's window and time of
+    /// How long the trajectory of --plan-out rests at each point (s); by default the scan's window and time of
     /// averaging.
     #[arg(long, requires = "plan_out", allow_negative_numbers = true)]
     dwell: Option<f64>,
@@ -60,7 +60,7 @@ pub struct Arguments {
     guided: Option<f64>,
 }
 
-/// Longest guided scan [s].
+/// Longest guided scan (s).
 const LONGEST: f64 = 36_000.0;
 
 /// Seed of the simulated rig's noise.
@@ -150,7 +150,7 @@ fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<R
 pub struct Course {
     /// Whether a log that is there is continued.
     pub resume: bool,
-    /// Time for which a hand leads, instead of the plan [s].
+    /// Time for which a hand leads, instead of the plan (s).
     pub guided: Option<f64>,
 }
 

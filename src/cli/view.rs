@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Write the window to this PNG file instead of opening it: needs no display, but some Vulkan, software too.
     #[arg(long, value_name = "PNG")]
     screenshot: Option<PathBuf>,
-    /// The picture's size [points].
+    /// The picture's size (points).
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x800", requires = "screenshot", value_parser = size)]
     size: [f32; 2],
     /// The picture in dark colours.
@@ -44,12 +44,12 @@ pub struct Arguments {
     /// The motion that the picture shows, press or scrape; by default the press, where there is one.
     #[arg(long, requires = "screenshot", value_parser = ["press", "scrape"])]
     motion: Option<String>,
-    /// When in that motion the picture is taken [s].
+    /// When in that motion the picture is taken (s).
     #[arg(long, default_value_t = 2.2, requires = "screenshot")]
     time: f64,
 }
 
-/// Greatest side of a picture [points].
+/// Greatest side of a picture (points).
 const GREATEST: f32 = 4000.0;
 
 fn size(text: &str) -> Result<[f32; 2], String> {

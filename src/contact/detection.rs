@@ -23,7 +23,7 @@ use glam::DVec3;
 /// Where a proxy node stands at rest, and what is known of it since.
 #[derive(Clone, Copy, Default)]
 struct RestDistance {
-    /// Unsigned distance to the surface at rest, or a lower bound of it [m].
+    /// Unsigned distance to the surface at rest, or a lower bound of it (m).
     distance: f64,
     /// False while `distance` is only a bound.
     exact: bool,
@@ -38,7 +38,7 @@ struct RestDistance {
 }
 
 impl RestDistance {
-    /// Signed distance to the surface at rest, negative inside, or a lower bound of it [m].
+    /// Signed distance to the surface at rest, negative inside, or a lower bound of it (m).
     fn signed(&self) -> f64 {
         if self.inside { -self.distance } else { self.distance }
     }
@@ -46,7 +46,7 @@ impl RestDistance {
 
 /// Detection for one thread: node positions of the current configuration and reusable lists.
 pub struct Detection {
-    /// Proxy nodes relative to the model's centre [m].
+    /// Proxy nodes relative to the model's centre (m).
     nodes: Vec<DVec3>,
     at_rest: Vec<RestDistance>,
     deformation: Deformation,
@@ -64,20 +64,20 @@ impl Detection {
         }
     }
 
-    /// Proxy nodes relative to the model's centre [m].
+    /// Proxy nodes relative to the model's centre (m).
     #[must_use]
     pub fn nodes(&self) -> &[DVec3] {
         &self.nodes
     }
 
     /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up
-    /// [m].
+    /// (m).
     pub fn distances(&self) -> impl Iterator<Item = f64> {
         self.at_rest.iter().map(RestDistance::signed)
     }
 
-    /// Takes up a configuration with proxy nodes at `nodes` [m] in the world, and returns the smallest signed distance
-    /// of a proxy node to the surface at rest, less its radius [m].
+    /// Takes up a configuration with proxy nodes at `nodes` (m) in the world, and returns the smallest signed distance
+    /// of a proxy node to the surface at rest, less its radius (m).
     pub fn set_configuration(&mut self, model: &Model, nodes: &[DVec3]) -> f64 {
         // The node that is most likely the nearest rules out most others.
         let first = self.place(model, nodes);
@@ -96,7 +96,7 @@ impl Detection {
         gap
     }
 
-    /// Places the proxy nodes at `nodes` [m] in the world, with lower bounds for distances that may be negative, and
+    /// Places the proxy nodes at `nodes` (m) in the world, with lower bounds for distances that may be negative, and
     /// returns the one whose bound, less its radius, is least.
     pub fn place(&mut self, model: &Model, nodes: &[DVec3]) -> usize {
         let (mut first, mut least) = (0, f64::INFINITY);
@@ -122,12 +122,12 @@ impl Detection {
         first
     }
 
-    /// Takes up the surface displaced by `forces` on `nodes`, three numbers a node [N], within `bound`.
+    /// Takes up the surface displaced by `forces` on `nodes`, three numbers a node (N), within `bound`.
     pub fn displace(&mut self, model: &Model, nodes: &[u32], forces: &[f64], bound: MotionBound) {
         self.deformation.take(model, nodes, forces, bound);
     }
 
-    /// Displacement of a surface node [m].
+    /// Displacement of a surface node (m).
     pub fn displacement(&mut self, model: &Model, node: u32) -> DVec3 {
         self.deformation.displacement(model, node)
     }

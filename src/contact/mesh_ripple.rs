@@ -12,18 +12,18 @@ use super::model::Model;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Ripple of the force on a contact point over a facet above which a bake warns that the mesh shows through [1].
+/// Ripple of the force on a contact point over a facet above which a bake warns that the mesh shows through (1).
 const RIPPLE_WARNING: f64 = 0.1;
 
 /// By how much the force on a contact point changes while it slides over a facet at constant depth, relative to its
-/// mean [1].
+/// mean (1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshRipple {
     /// Median over the facets that can be reached.
     pub median: f64,
     /// Value at the worst facet.
     pub worst: f64,
-    /// Mean length of the mesh's edges [m].
+    /// Mean length of the mesh's edges (m).
     pub edge: f64,
     /// Whether the object has a skin.
     pub skin: bool,

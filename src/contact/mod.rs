@@ -77,26 +77,26 @@ pub struct Equilibrium {
     pub status: Status,
     /// Steps tried (`energy`, `linearised`) or passes (`paper`).
     pub iterations: u32,
-    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed [1]. In contact
+    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed (1). In contact
     /// so stiff that forces follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
     pub residual: f64,
-    /// Stored energy U: elastic and contact springs [J].
+    /// Stored energy U: elastic and contact springs (J).
     pub energy: f64,
-    /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius; negative inside [m].
+    /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius; negative inside (m).
     pub gap: f64,
-    /// Contact torque on the proxy, tau = sum_i J_i^T (force on x_i) [N m].
+    /// Contact torque on the proxy, tau = sum_i J_i^T (force on x_i) (N m).
     pub torque: JointVector,
-    /// Tangent d tau/d q [N m/rad], where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy`,
+    /// Tangent d tau/d q (N m/rad), where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy`,
     /// and the equilibrium is a converged, strict minimum.
     pub tangent: Option<JointMatrix>,
-    /// Contact forces on the object's nodes, ascending by node, each node once [N].
+    /// Contact forces on the object's nodes, ascending by node, each node once (N).
     pub forces: Vec<NodeForce>,
     /// Contacts seen from the proxy.
     pub touches: Vec<Touch>,
 }
 
 impl Equilibrium {
-    /// Returns the result of a configuration of `joints` joints without contact, `gap` away from it [m].
+    /// Returns the result of a configuration of `joints` joints without contact, `gap` away from it (m).
     #[must_use]
     pub fn free(gap: f64, joints: usize) -> Self {
         Self {
@@ -112,7 +112,7 @@ impl Equilibrium {
         }
     }
 
-    /// Returns the forces on the proxy's nodes that are touched, ascending by node [N].
+    /// Returns the forces on the proxy's nodes that are touched, ascending by node (N).
     #[must_use]
     pub fn on_proxy(&self) -> Vec<NodeForce> {
         self.touches.iter().map(|touch| NodeForce { node: touch.proxy_node, force: touch.force }).collect()
@@ -124,7 +124,7 @@ impl Equilibrium {
 pub struct NodeForce {
     /// Number of the object's node.
     pub node: u32,
-    /// [N]
+    /// (N)
     pub force: DVec3,
 }
 
@@ -139,6 +139,6 @@ pub struct Touch {
     /// The object's nodes of the touched facet, and the share of the reaction that each carries, in sum one: the three
     /// corners of a flat facet, or the nodes on which a smooth one depends: its corners and all their neighbours.
     pub carriers: Vec<(u32, f64)>,
-    /// Force on the proxy node [N].
+    /// Force on the proxy node (N).
     pub force: DVec3,
 }

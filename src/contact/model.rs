@@ -8,7 +8,7 @@ use crate::scene::ContactSpec;
 use std::sync::Arc;
 
 /// Stiffness of a rigid contact point, in units of the stiffness of the object's softest node (one over the trace of
-/// its compliance) [1]: force and torque differ from those of perfectly rigid contact by the inverse of this.
+/// its compliance) (1): force and torque differ from those of perfectly rigid contact by the inverse of this.
 const RIGID_STIFFNESS: f64 = 1e6;
 
 /// An object and a proxy, prepared for contact. A clone shares what is large.
@@ -24,22 +24,22 @@ pub struct Model<'a> {
     pub contact: ContactSpec,
     /// Stiffness kc = 3 Kc at a contact point of the energy form: three springs Kc on the nodes of a triangle act along
     /// the normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
-    /// `RIGID_STIFFNESS` [N/m].
+    /// `RIGID_STIFFNESS` (N/m).
     pub kc: f64,
     /// Stiffness of each proxy node's spring over kc, in the algorithms but `paper`, whose springs are all alike: more
-    /// than one where the node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] [1].
+    /// than one where the node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] (1).
     pub shares: Vec<f64>,
     /// Whether each equilibrium comes with its tangent d tau/d q.
     pub with_tangent: bool,
     /// The surface at rest.
     pub surface: Arc<RestSurface<'a>>,
     /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(max_nodal_compliance) times
-    /// |u| in the energy norm [m/N].
+    /// |u| in the energy norm (m/N).
     pub max_nodal_compliance: f64,
     /// Largest eigenvalue of a covered node's own block C_jj, or a bound of it: no node moves farther than
-    /// sqrt(mobility) times |u| in the energy norm [m/N].
+    /// sqrt(mobility) times |u| in the energy norm (m/N).
     pub mobility: f64,
-    /// The same for what facets stand off the flat triangles by, where contact is with a smooth surface [m/N].
+    /// The same for what facets stand off the flat triangles by, where contact is with a smooth surface (m/N).
     pub(crate) bulge_mobility: f64,
     /// Whether the compliance covers all nodes of the facets of a leaf (leaves of the surface's tree).
     pub(super) covered_leaves: Arc<Vec<bool>>,
@@ -48,9 +48,9 @@ pub struct Model<'a> {
 /// How far a displaced surface is from the surface at rest.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MotionBound {
-    /// No point of the surface has moved farther [m].
+    /// No point of the surface has moved farther (m).
     pub moved: f64,
-    /// No facet stands off its flat triangle by more [m].
+    /// No facet stands off its flat triangle by more (m).
     pub bulge: f64,
 }
 
@@ -115,14 +115,14 @@ impl<'a> Model<'a> {
         model
     }
 
-    /// Takes another contact stiffness Kc; infinity is rigid [N/m].
+    /// Takes another contact stiffness Kc; infinity is rigid (N/m).
     pub fn set_stiffness(&mut self, stiffness: f64) {
         self.contact.stiffness =
             if stiffness.is_infinite() { RIGID_STIFFNESS / (3.0 * self.max_nodal_compliance) } else { stiffness };
         self.kc = 3.0 * self.contact.stiffness;
     }
 
-    /// Returns how far the surface can be from where it rests when the object stores the energy `elastic` [J]: for any
+    /// Returns how far the surface can be from where it rests when the object stores the energy `elastic` (J): for any
     /// sum g of the nodes' displacements |g . u|^2 <= |g . C g| |u|^2, the last in the energy norm.
     #[must_use]
     pub fn motion_bound(&self, elastic: f64) -> MotionBound {
@@ -133,7 +133,7 @@ impl<'a> Model<'a> {
 }
 
 /// The greatest g . C g over what facets stand off their flat triangles by, as a sum g of nodes' displacements: a bound
-/// of its largest eigenvalue. Nodes that are not covered do not move [m/N].
+/// of its largest eigenvalue. Nodes that are not covered do not move (m/N).
 fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
     smooth.bulge_squared(|terms| {
         let places = terms
@@ -154,7 +154,7 @@ fn bulge_mobility(smooth: &SmoothSurface, compliance: &Compliance) -> f64 {
 }
 
 /// Largest trace of a node's own block, and a bound of its largest eigenvalue: that of an isotropic object's block is a
-/// third of its trace [m/N].
+/// third of its trace (m/N).
 fn max_nodal_compliance(compliance: &Compliance) -> (f64, f64) {
     let trace = |j: usize| {
         let own = compliance.block(j, j);

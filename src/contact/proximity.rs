@@ -41,7 +41,7 @@ impl<'a> Proximity<'a> {
     }
 
     /// The gap at the joint coordinates `q`, [`super::Equilibrium::gap`], which no proxy node changes by more than it
-    /// moves [m].
+    /// moves (m).
     pub fn gap(&mut self, q: &[f64]) -> f64 {
         self.model.chain.pose(q, &mut self.pose);
         self.detection.set_configuration(self.model, &self.pose.nodes)
@@ -58,7 +58,7 @@ impl<'a> Proximity<'a> {
         NearestNode { node, gap, position, surface: surface.centre + facet.point(closest.point.weights) }
     }
 
-    /// A lower bound of what each proxy node contributes to the last gap [m].
+    /// A lower bound of what each proxy node contributes to the last gap (m).
     pub fn clearances(&self) -> impl Iterator<Item = f64> {
         let nodes = self.model.chain.nodes.iter();
         self.detection.distances().zip(nodes).map(|(distance, node)| distance - node.radius)

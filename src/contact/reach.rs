@@ -15,7 +15,7 @@ use crate::proxy::Chain;
 use crate::scene::ContactSpec;
 use rayon::prelude::*;
 
-/// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest [1]: in
+/// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest (1): in
 /// stiff contact it moves by that depth along the normal, and as much again leaves room for what neighbouring nodes
 /// drag along.
 const EXPECTED_MOTION: f64 = 2.0;
@@ -95,7 +95,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
 }
 
 /// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than
-/// `moved` [m].
+/// `moved` (m).
 pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equilibrium, moved: f64) -> bool {
     let covered = |node: u32| model.compliance.place(node).is_some();
     let mut within = equilibrium.forces.iter().all(|force| covered(force.node));

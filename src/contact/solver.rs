@@ -23,9 +23,9 @@ pub struct Solver<'a> {
     paper: PaperIteration,
     /// Search that holds the displacement of the last configuration.
     held_by: HeldBy,
-    /// That displacement, where it was asked for [m].
+    /// That displacement, where it was asked for (m).
     displacement: Option<Vec<f64>>,
-    /// Sum of the forces on each surface node [N], and whether it is among `touched`.
+    /// Sum of the forces on each surface node (N), and whether it is among `touched`.
     node_forces: Vec<DVec3>,
     marked: Vec<bool>,
     touched: Vec<u32>,
@@ -58,7 +58,7 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Equilibrium at the joint coordinates `q`, one per joint [rad or m].
+    /// Equilibrium at the joint coordinates `q`, one per joint (rad or m).
     ///
     /// Numbers that are not finite, or fewer than there are joints, give [`Status::Unconverged`] with zeros and a
     /// residual of one: nothing is balanced.
@@ -72,7 +72,7 @@ impl<'a> Solver<'a> {
     }
 
     /// The same by the energy form, from near the solution on: where `forces` on the object's nodes hold it with
-    /// contact stiffness `kc` [N/m].
+    /// contact stiffness `kc` (N/m).
     #[must_use]
     pub(crate) fn solve_with_guess(
         &mut self,
@@ -164,7 +164,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Smallest signed distance of the proxy's nodes to the surface at rest, less their radius, at the joint
-    /// coordinates `q`, without solving; NaN where those are not finite or not one per joint [m].
+    /// coordinates `q`, without solving; NaN where those are not finite or not one per joint (m).
     #[must_use]
     pub fn gap(&mut self, q: &[f64]) -> f64 {
         if q.len() != self.model.chain.joints.len() || !q.iter().all(|x| x.is_finite()) {
@@ -174,12 +174,12 @@ impl<'a> Solver<'a> {
         self.set_configuration()
     }
 
-    /// The gap of the configuration posed last, which detection takes up [m].
+    /// The gap of the configuration posed last, which detection takes up (m).
     fn set_configuration(&mut self) -> f64 {
         self.detection.set_configuration(self.model, &self.pose.nodes)
     }
 
-    /// Displacement u of the surface nodes at the last configuration solved, three numbers a node [m].
+    /// Displacement u of the surface nodes at the last configuration solved, three numbers a node (m).
     #[must_use]
     pub fn displacement(&mut self) -> &[f64] {
         let Self { model, energy, paper, held_by, displacement, .. } = self;
@@ -203,7 +203,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Energy at the start of the last stage of the energy form's last search, where contact has taken its full
-    /// stiffness, and after each step taken since: it never rises [J].
+    /// stiffness, and after each step taken since: it never rises (J).
     #[must_use]
     pub fn energy_history(&self) -> &[f64] {
         &self.energy.history

@@ -11,9 +11,9 @@ pub struct MeasuredError {
     pub configurations: usize,
     /// Configurations left out, because the direct solution did not converge.
     pub left_out: usize,
-    /// Rms of the torque at the configurations [N m].
+    /// Rms of the torque at the configurations (N m).
     pub torque: f64,
-    /// Arm with which the forces of sliding joints count [m]; absent where no joint slides.
+    /// Arm with which the forces of sliding joints count (m); absent where no joint slides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lever_arm: Option<f64>,
     /// Interpolation that the scene names.
@@ -27,16 +27,16 @@ pub struct MeasuredError {
 pub struct InterpolationError {
     /// Name of the interpolation, as in the scene.
     pub interpolation: String,
-    /// Median [N m].
+    /// Median (N m).
     pub median: f64,
-    /// Root mean square [N m].
+    /// Root mean square (N m).
     pub rms: f64,
-    /// Greatest [N m].
+    /// Greatest (N m).
     pub worst: f64,
 }
 
 impl InterpolationError {
-    /// The error of `interpolation`, of which `errors` are samples [N m]; zero where there are none.
+    /// The error of `interpolation`, of which `errors` are samples (N m); zero where there are none.
     #[must_use]
     pub fn of(interpolation: &str, mut errors: Vec<f64>) -> Self {
         errors.sort_unstable_by(f64::total_cmp);
@@ -51,7 +51,7 @@ impl InterpolationError {
 }
 
 impl MeasuredError {
-    /// Rms error of the scene's own interpolation over the rms of the torque [1]; zero where nothing touches.
+    /// Rms error of the scene's own interpolation over the rms of the torque (1); zero where nothing touches.
     #[must_use]
     pub fn relative(&self) -> f64 {
         let own = self.errors.iter().find(|error| error.interpolation == self.interpolation);

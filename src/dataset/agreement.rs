@@ -8,7 +8,7 @@ use crate::scene::{Rendering, Shape};
 use glam::DVec3;
 
 /// Greatest share of its radius by which a node of a sphere is off it: what rounding leaves of coordinates far from the
-/// origin [1].
+/// origin (1).
 const OFF_SPHERE: f64 = 1e-6;
 
 impl Dataset {

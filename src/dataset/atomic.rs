@@ -15,7 +15,7 @@ use std::{
 };
 use tempfile::{NamedTempFile, TempPath};
 
-/// Buffer between the writer and the file [bytes].
+/// Buffer between the writer and the file (bytes).
 pub(crate) const BUFFER: usize = 1 << 20;
 
 /// A file that is to appear.

@@ -10,17 +10,17 @@
 //!
 //! | tensor | type | shape | |
 //! |---|---|---|---|
-//! | `torque` | f64 | n1 .. nd, d | tau [N m; N at prismatic joints] |
-//! | `energy` | f64 | n1 .. nd | U [J] |
-//! | `tangent` | f32 | n1 .. nd, d (d + 1) / 2 | d tau/d q, lower triangle, where the interpolation uses it [N m/rad] |
-//! | `gap` | f32 | n1 .. nd | smallest signed distance at rest; a positive lower bound far from contact [m] |
+//! | `torque` | f64 | n1 .. nd, d | tau (N m; N at prismatic joints) |
+//! | `energy` | f64 | n1 .. nd | U (J) |
+//! | `tangent` | f32 | n1 .. nd, d (d + 1) / 2 | d tau/d q, lower triangle, where the interpolation uses it (N m/rad) |
+//! | `gap` | f32 | n1 .. nd | smallest signed distance at rest; a positive lower bound far from contact (m) |
 //! | `residual`, `iterations` | f32, u32 | n1 .. nd | of the contact solver |
 //! | `status` | u8 | n1 .. nd | [`crate::contact::Status`] |
 //! | `contact_offsets` | u64 | points + 1 | rows of the next two |
-//! | `contact_nodes`, `contact_forces` | u32, f32 | c and c, 3 | object node, force on it [N] |
+//! | `contact_nodes`, `contact_forces` | u32, f32 | c and c, 3 | object node, force on it (N) |
 //! | `touch_offsets`, `touch_nodes`, `touch_forces` | u64, u32, f32 | as these | on nodes of the proxy, where needed |
-//! | `surface_nodes`, `surface_triangles` | f64, u32 | S, 3 and T, 3 | at rest [m] |
-//! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of tetrahedra; inner nodes count from S on [m] |
+//! | `surface_nodes`, `surface_triangles` | f64, u32 | S, 3 and T, 3 | at rest (m) |
+//! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of tetrahedra; inner nodes count from S on (m) |
 //! | `regions` | u32 | V | physical volume of each tetrahedron, where the mesh names any |
 //!
 //! In Python: `safetensors.numpy.load_file("sphere.haptize")["torque"]`.
@@ -59,17 +59,17 @@ compile_error!("dataset columns are read where they lie, which needs a little-en
 pub(super) const FORMAT: &str = "haptize dataset 1";
 /// How every header begins; the checksum's digits follow.
 pub(super) const OPENING: &[u8] = br#"{"__metadata__":{"checksum":""#;
-/// Length of the header's length [bytes].
+/// Length of the header's length (bytes).
 pub(super) const LENGTH: usize = 8;
 /// Where the checksum's digits begin.
 pub(super) const CHECKSUM: usize = LENGTH + OPENING.len();
 /// Digits of the checksum while it is computed.
 pub(super) const NO_CHECKSUM: &str = "00000000";
-/// Tensors begin at a multiple of this: a page [bytes].
+/// Tensors begin at a multiple of this: a page (bytes).
 pub(super) const PAGE: usize = 4096;
-/// Buffer between a piece of a tensor and the file: what is longer goes there as it is [bytes].
+/// Buffer between a piece of a tensor and the file: what is longer goes there as it is (bytes).
 pub(crate) const PIECE_BUFFER: usize = 1 << 16;
-/// Longest header that is read or written: bounds what a hostile file can make the parser allocate [bytes].
+/// Longest header that is read or written: bounds what a hostile file can make the parser allocate (bytes).
 pub(super) const MAX_HEADER: usize = 16 << 20;
 
 /// The header as text.
@@ -118,7 +118,7 @@ pub(crate) struct Tensor<C> {
 
 /// Where a tensor's numbers come from: pieces that follow one another, which all cores write.
 pub(crate) trait Contents: Sync {
-    /// Where each piece begins in the tensor [bytes].
+    /// Where each piece begins in the tensor (bytes).
     fn pieces(&self) -> Vec<usize>;
     /// Writes the numbers of a piece, little-endian.
     fn write(&self, piece: usize, writer: &mut impl Write) -> io::Result<()>;
@@ -195,7 +195,7 @@ pub(crate) fn surface_tensors(surface: &Surface) -> Vec<Tensor<&[u8]>> {
     tensors
 }
 
-/// Memory of all columns [bytes].
+/// Memory of all columns (bytes).
 pub(super) fn bytes(dataset: &Dataset) -> usize {
     tensors(dataset).iter().map(Tensor::bytes).sum()
 }
@@ -322,7 +322,7 @@ fn write_tensor<C: Contents>(file: &File, place: usize, tensor: &Tensor<C>) -> i
 /// A place in a file, others of which are written at the same time, and the checksum of what goes there.
 struct Placed<'a> {
     file: &'a File,
-    /// [bytes]
+    /// (bytes)
     place: usize,
     hasher: crc32fast::Hasher,
 }

@@ -10,9 +10,9 @@ pub struct Axis {
     pub name: String,
     /// `rad` or `m`.
     pub unit: String,
-    /// First grid line [rad or m].
+    /// First grid line (rad or m).
     pub start: f64,
-    /// Distance between grid lines, positive [rad or m].
+    /// Distance between grid lines, positive (rad or m).
     pub step: f64,
     /// Number of grid lines.
     pub count: usize,
@@ -35,7 +35,7 @@ pub struct Grid {
 }
 
 impl Axis {
-    /// Coordinate of grid line `k` [rad or m].
+    /// Coordinate of grid line `k` (rad or m).
     #[must_use]
     pub fn coordinate(&self, k: usize) -> f64 {
         self.start + k as f64 * self.step

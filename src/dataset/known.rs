@@ -19,7 +19,7 @@ impl Dataset {
     }
 
     /// A half space `n . q > 0` of C-space that pushes back with `U = 1/2 k (n . q)^2`, n the unit vector `normal` and
-    /// k the `stiffness` [N m/rad].
+    /// k the `stiffness` (N m/rad).
     #[must_use]
     pub fn of_half_space(grid: Grid, normal: &JointVector, stiffness: f64) -> Self {
         Self::of_field(grid, |q| {

@@ -41,20 +41,20 @@ use std::sync::Arc;
 pub struct Dataset {
     /// The configurations q.
     pub grid: Grid,
-    /// tau, joint fastest: entry `point * joints + joint` [N m].
+    /// tau, joint fastest: entry `point * joints + joint` (N m).
     pub torque: Column<f64>,
-    /// U [J]; absent in scanned datasets.
+    /// U (J); absent in scanned datasets.
     pub energy: Option<Column<f64>>,
     /// Lower triangle of the tangent d tau/d q, row by row: (0, 0), (1, 0), (1, 1) and so on, a point's entries side by
     /// side; zeros where nothing touches or there is no derivative. Absent where the interpolation does not use it, and
-    /// in scanned datasets [N m/rad].
+    /// in scanned datasets (N m/rad).
     pub tangent: Option<Column<f32>>,
-    /// Smallest signed distance of the proxy to the surface at rest [m]; more than two grid steps away from every point
+    /// Smallest signed distance of the proxy to the surface at rest (m); more than two grid steps away from every point
     /// in contact it may be a positive lower bound of that, where nothing was solved. Absent in scanned datasets.
     pub gap: Option<Column<f32>>,
     /// [`Status`] as its number.
     pub status: Column<u8>,
-    /// Relative residual [1]; absent in scanned datasets.
+    /// Relative residual (1); absent in scanned datasets.
     pub residual: Option<Column<f32>>,
     /// Iterations of the contact solver; absent in scanned datasets.
     pub iterations: Option<Column<u32>>,
@@ -79,7 +79,7 @@ pub struct Contacts {
     pub offsets: Column<u64>,
     /// Nodes of the object's surface, or of the proxy; ascending within a row.
     pub nodes: Column<u32>,
-    /// Three numbers a contact [N].
+    /// Three numbers a contact (N).
     pub forces: Column<f32>,
 }
 
@@ -91,7 +91,7 @@ pub(crate) const TOUCHES: [&str; 3] = ["touch_offsets", "touch_nodes", "touch_fo
 /// The object's geometry at rest: its surface, and what is inside where the scene's mesh is one of tetrahedra.
 #[derive(Clone)]
 pub struct Surface {
-    /// Three numbers a node [m].
+    /// Three numbers a node (m).
     pub nodes: Column<f64>,
     /// Three node numbers a triangle.
     pub triangles: Column<u32>,
@@ -102,7 +102,7 @@ pub struct Surface {
 /// Tetrahedra inside a surface.
 #[derive(Clone)]
 pub struct Solid {
-    /// Nodes that are not on the surface, numbered behind those that are, three numbers each [m].
+    /// Nodes that are not on the surface, numbered behind those that are, three numbers each (m).
     pub inner_nodes: Column<f64>,
     /// Four node numbers a tetrahedron.
     pub tetrahedra: Column<u32>,
@@ -117,7 +117,7 @@ pub struct Provenance {
     pub version: String,
     /// How equation (2) was solved, as the scene names it.
     pub algorithm: String,
-    /// Relative residual asked for [1].
+    /// Relative residual asked for (1).
     pub tolerance: f64,
     /// `cpu` or `gpu`.
     pub backend: String,
@@ -134,7 +134,7 @@ pub struct Provenance {
     /// How much a contact point feels the mesh; absent where nothing was solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh_ripple: Option<MeshRipple>,
-    /// Where the grid was chosen for an error, that error: rms, over the rms of the torque [1].
+    /// Where the grid was chosen for an error, that error: rms, over the rms of the torque (1).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aim: Option<f64>,
 }
@@ -167,14 +167,14 @@ impl Dataset {
         Status::from_number(self.status[point]).unwrap_or(Status::Outside)
     }
 
-    /// tau of grid point `point` [N m].
+    /// tau of grid point `point` (N m).
     #[must_use]
     pub fn torque(&self, point: usize) -> &[f64] {
         let joints = self.grid.joints();
         &self.torque[point * joints..(point + 1) * joints]
     }
 
-    /// Contact forces of grid point `point`, ascending by node; none where they are not stored [N].
+    /// Contact forces of grid point `point`, ascending by node; none where they are not stored (N).
     pub fn forces(&self, point: usize) -> impl ExactSizeIterator<Item = NodeForce> {
         let (nodes, forces) = self.contacts.as_ref().map_or((&[][..], &[][..]), |contacts| contacts.row(point));
         nodes.iter().zip(forces.chunks_exact(3)).map(|(&node, force)| NodeForce {

@@ -14,25 +14,25 @@ pub struct Summary {
     /// By status.
     #[serde(flatten)]
     pub statuses: StatusCounts,
-    /// Least and greatest trusted torque of each joint (0 included, as in free space) [N m or N].
+    /// Least and greatest trusted torque of each joint (0 included, as in free space) (N m or N).
     pub torque: Vec<[f64; 2]>,
-    /// Greatest stored energy at a converged point [J].
+    /// Greatest stored energy at a converged point (J).
     pub max_energy: Option<f64>,
-    /// Greatest depth of a proxy node below the surface at rest; negative when none gets inside [m].
+    /// Greatest depth of a proxy node below the surface at rest; negative when none gets inside (m).
     pub max_depth: Option<f64>,
-    /// Greatest residual of a converged point in contact [1].
+    /// Greatest residual of a converged point in contact (1).
     pub max_residual: Option<f64>,
     /// Stored contact forces, over all points.
     pub contacts: Option<usize>,
     /// Most contact forces at one point.
     pub max_contacts: Option<usize>,
-    /// Greatest contact force on a node at a converged point [N].
+    /// Greatest contact force on a node at a converged point (N).
     pub max_force: Option<f64>,
     /// Nodes and triangles of the object's surface.
     pub surface: Option<[usize; 2]>,
     /// Refinement of the grid.
     pub refinement: Option<Refinement>,
-    /// Memory of all columns, and of what refines them [bytes].
+    /// Memory of all columns, and of what refines them (bytes).
     pub bytes: usize,
     /// Where the dataset comes from.
     pub provenance: Provenance,
@@ -43,7 +43,7 @@ pub struct Summary {
 pub struct Refinement {
     /// Nodes of each level, the grid's first.
     pub nodes: Vec<usize>,
-    /// Memory [bytes].
+    /// Memory (bytes).
     pub bytes: usize,
 }
 
@@ -160,7 +160,7 @@ impl Dataset {
         .collect()
     }
 
-    /// Greatest residual of a converged point in contact [1]; `None` where residuals are not stored.
+    /// Greatest residual of a converged point in contact (1); `None` where residuals are not stored.
     #[must_use]
     pub fn max_residual(&self) -> Option<f64> {
         let residual = self.residual.as_ref()?;

@@ -334,7 +334,7 @@ fn resting_hand() -> Result<SimulatedHand, String> {
 /// Joints of the simulated device where no scene says how many.
 const SIMULATED_JOINTS: usize = 3;
 
-/// Maximum torque of each joint of the simulated device [N m]: that of a desktop device.
+/// Maximum torque of each joint of the simulated device (N m): that of a desktop device.
 const SIMULATED_TORQUE: f64 = 1.5;
 
 /// Makes of the device behind `guard` one in the joints of `chain`, as `[device]` in the scene says, and switches its

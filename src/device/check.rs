@@ -8,10 +8,10 @@ use super::{Guard, Halt, Tally};
 use crate::JointVector;
 use serde::Serialize;
 
-/// Rate of the push [Hz]: slow enough to be followed by eye and hand.
+/// Rate of the push (Hz): slow enough to be followed by eye and hand.
 const SWING: f64 = 0.5;
 
-/// Part of the device's limit that pushes [1].
+/// Part of the device's limit that pushes (1).
 pub const PUSH_SHARE: f64 = 0.1;
 
 /// One phase of the procedure.
@@ -31,15 +31,15 @@ pub enum Phase {
 pub struct CheckReport {
     /// Which.
     pub phase: Phase,
-    /// Duration [s].
+    /// Duration (s).
     pub seconds: f64,
     /// Measurements that were new when they were taken.
     pub fresh: u64,
-    /// Age of the oldest measurement [s].
+    /// Age of the oldest measurement (s).
     pub oldest: f64,
-    /// Minimum and maximum of each coordinate [rad or m].
+    /// Minimum and maximum of each coordinate (rad or m).
     pub range: Vec<[f64; 2]>,
-    /// Work of the push on each coordinate [J]: positive if the device moves the way it is pushed.
+    /// Work of the push on each coordinate (J): positive if the device moves the way it is pushed.
     pub moves_along: Vec<f64>,
     /// Whether each coordinate was pushed at all: not while the dead-man key is up.
     pub pushed: Vec<bool>,
@@ -57,7 +57,7 @@ impl CheckReport {
     }
 }
 
-/// Runs `phase` for `seconds` on `guard`. `tick` waits for the next tick and returns the time since the last [s], or
+/// Runs `phase` for `seconds` on `guard`. `tick` waits for the next tick and returns the time since the last (s), or
 /// `None` to end early. Motors are switched on where the phase needs them.
 ///
 /// # Errors

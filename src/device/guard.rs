@@ -22,19 +22,19 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-/// Part of the device's own limit that is used [1]. Larger: rounding in a device's units may trip the device's own
+/// Part of the device's own limit that is used (1). Larger: rounding in a device's units may trip the device's own
 /// protection.
 pub const LIMIT_SHARE: f64 = 0.9;
 
-/// Time over which efforts rise to what is asked for [s]: long enough for a hand to let go of a device that pulls the
+/// Time over which efforts rise to what is asked for (s): long enough for a hand to let go of a device that pulls the
 /// wrong way.
 pub const RAMP_TIME: f64 = 0.5;
 
-/// Time in which an effort may go from zero to its limit [s]: three ticks at 1 kHz, as the loop's own default. Shorter:
+/// Time in which an effort may go from zero to its limit (s): three ticks at 1 kHz, as the loop's own default. Shorter:
 /// a look-up that jumps is felt as a knock.
 pub const RISE_TIME: f64 = 3e-3;
 
-/// Time over which efforts of warm motors are scaled down to zero [s].
+/// Time over which efforts of warm motors are scaled down to zero (s).
 pub const WARM_TIME: f64 = 2.0;
 
 /// A device behind its safety layer.
@@ -42,13 +42,13 @@ pub struct Guard {
     hardware: Box<dyn Hardware>,
     coordinates: Coordinates,
     limits: Limits,
-    /// Clamp of each effort [N m or N].
+    /// Clamp of each effort (N m or N).
     most: JointVector,
     key: Option<Key>,
     /// Raised when the session is to end.
     over: Option<&'static AtomicBool>,
     latest: Measurement,
-    /// Before the last reading [s].
+    /// Before the last reading (s).
     elapsed: f64,
     /// Part of the ramp that has passed, 0 to 1.
     ramp: f64,
@@ -56,7 +56,7 @@ pub struct Guard {
     heat: f64,
     /// The first reason that is final.
     stopped: Option<Halt>,
-    /// On the device now [N m or N].
+    /// On the device now (N m or N).
     effort: JointVector,
     enabled: bool,
 }
@@ -64,7 +64,7 @@ pub struct Guard {
 /// The effort that a tick left the device with, in the device's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Held {
-    /// On the device until the next tick [N m or N].
+    /// On the device until the next tick (N m or N).
     pub effort: JointVector,
     /// Clamps that acted.
     pub clamps: Clamps,
@@ -111,7 +111,7 @@ impl Guard {
         }
     }
 
-    /// Lowers each clamp to `limits` [N m or N] where that is less.
+    /// Lowers each clamp to `limits` (N m or N) where that is less.
     ///
     /// # Errors
     /// Returns the length of `limits` if it is not the number of coordinates.
@@ -169,7 +169,7 @@ impl Guard {
         &self.limits
     }
 
-    /// Returns the clamp of each effort [N m or N].
+    /// Returns the clamp of each effort (N m or N).
     #[must_use]
     pub fn most(&self) -> &JointVector {
         &self.most
@@ -187,7 +187,7 @@ impl Guard {
         self.stopped
     }
 
-    /// Takes a measurement, `elapsed` [s] after the last. If there is none, the last one grows old.
+    /// Takes a measurement, `elapsed` (s) after the last. If there is none, the last one grows old.
     pub fn read(&mut self, elapsed: f64) -> &Measurement {
         // Also false for what is not a number.
         self.elapsed = if elapsed > 0.0 { elapsed.min(GREATEST_INTERVAL) } else { 0.0 };
@@ -210,7 +210,7 @@ impl Guard {
         &self.latest
     }
 
-    /// Holds as much of `wanted` [N m or N] as is safe, until the next call.
+    /// Holds as much of `wanted` (N m or N) as is safe, until the next call.
     pub fn write(&mut self, wanted: &JointVector) -> Held {
         let zero = JointVector::zeros(self.coordinates.count());
         let (mut effort, mut clamps) = (zero, Clamps::empty());

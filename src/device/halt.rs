@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Longest age of a measurement on which torque may rest [s]. Longer: torque follows a hand that has moved on. Shorter:
+/// Longest age of a measurement on which torque may rest (s). Longer: torque follows a hand that has moved on. Shorter:
 /// a pause of the operating system, some milliseconds without real-time priority, ends the feeling of contact.
 pub const LONGEST_AGE: f64 = 5e-3;
 

@@ -48,7 +48,7 @@ impl SimulatedHand {
         Self::holding(&spec.hand, &spec.device_inertia, &spec.device_damping, motion)
     }
 
-    /// Returns `hand` holding a device of the given `inertia` [kg m^2] and `damping` [N m s/rad] at each joint, at rest
+    /// Returns `hand` holding a device of the given `inertia` (kg m^2) and `damping` (N m s/rad) at each joint, at rest
     /// at the beginning of `motion`.
     ///
     /// # Errors
@@ -87,12 +87,12 @@ impl Device for SimulatedHand {
 /// Arm and device: mass, spring and damper of each joint, and their state.
 #[derive(Clone, Debug)]
 pub(super) struct Arm {
-    /// Hand and device together [kg m^2].
+    /// Hand and device together (kg m^2).
     inertia: JointVector,
-    /// Kh [N m/rad], Bh [N m s/rad].
+    /// Kh (N m/rad), Bh (N m s/rad).
     stiffness: JointVector,
     damping: JointVector,
-    /// bd [N m s/rad].
+    /// bd (N m s/rad).
     device_damping: JointVector,
     position: JointVector,
     velocity: JointVector,
@@ -133,7 +133,7 @@ impl Arm {
         })
     }
 
-    /// y [rad or m].
+    /// y (rad or m).
     pub(super) fn position(&self) -> &JointVector {
         &self.position
     }
@@ -143,7 +143,7 @@ impl Arm {
         self.torque = *torque;
     }
 
-    /// Moves on by `elapsed` [s]; `goal` and `goal_velocity` are those of the hand in the middle of it.
+    /// Moves on by `elapsed` (s); `goal` and `goal_velocity` are those of the hand in the middle of it.
     pub(super) fn step(&mut self, goal: &JointVector, goal_velocity: &JointVector, elapsed: f64) {
         let half = 0.5 * elapsed;
         for a in 0..self.position.len() {

@@ -10,9 +10,9 @@ use std::sync::Arc;
 /// Coordinates in which a device measures and is driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coordinates {
-    /// Joint coordinates [rad or m], driven by joint torques [N m or N].
+    /// Joint coordinates (rad or m), driven by joint torques (N m or N).
     Joints(usize),
-    /// Position of its tip along three axes [m], driven by a force [N].
+    /// Position of its tip along three axes (m), driven by a force (N).
     Tip,
 }
 
@@ -48,7 +48,7 @@ impl Coordinates {
 /// The limits of a device, and the watchdog over it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Maximum size of each effort [N m or N].
+    /// Maximum size of each effort (N m or N).
     pub effort: JointVector,
     /// The reaction of the device when commands stop.
     pub watchdog: Watchdog,
@@ -60,7 +60,7 @@ pub struct Limits {
 pub enum Watchdog {
     /// Nothing: a host that dies leaves the last torque on.
     None,
-    /// It switches its motors off after this time [s].
+    /// It switches its motors off after this time (s).
     After(f64),
     /// It switches its motors off, after a time that its maker does not state.
     Unstated,
@@ -69,9 +69,9 @@ pub enum Watchdog {
 /// A measurement of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measurement {
-    /// In the device's coordinates [rad or m].
+    /// In the device's coordinates (rad or m).
     pub position: JointVector,
-    /// Time since the position was measured [s].
+    /// Time since the position was measured (s).
     pub age: f64,
     /// Whether motors are warm.
     pub warm: bool,
@@ -109,7 +109,7 @@ pub trait Scheduler: Send + Sync {
     /// Returns the reason if the thread stops calling; `tick` is then not called any more.
     fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt>;
 
-    /// Returns how often it calls [Hz].
+    /// Returns how often it calls (Hz).
     fn rate(&self) -> f64;
 }
 
@@ -131,13 +131,13 @@ pub trait Hardware: Send {
     /// Returns the reason if the device refuses.
     fn enable(&mut self) -> Result<(), Halt>;
 
-    /// Returns the newest measurement, `elapsed` [s] after the last call (0 at the first).
+    /// Returns the newest measurement, `elapsed` (s) after the last call (0 at the first).
     ///
     /// # Errors
     /// Returns the reason if nothing can be measured any more. A reply that is merely late is no error: the age grows.
     fn read(&mut self, elapsed: f64) -> Result<Measurement, Halt>;
 
-    /// Commands `effort` [N m or N] until the next call.
+    /// Commands `effort` (N m or N) until the next call.
     ///
     /// # Errors
     /// Returns the reason if the device cannot be driven any more.

@@ -1,4 +1,4 @@
-//! Haply Inverse3, through the maker's service: position of its cursor [m] and force on it [N].
+//! Haply Inverse3, through the maker's service: position of its cursor (m) and force on it (N).
 //!
 //! The service (Inverse SDK 3.5) speaks WebSocket, by default on port 10001 of this machine. On connection it sends one
 //! inventory of all devices; then exactly one state for each message that it gets. Commands count once: when messages
@@ -37,7 +37,7 @@ use tungstenite::{Message, WebSocket};
 /// Address of the service.
 const ADDRESS: &str = "localhost:10001";
 
-/// Maximum force [N]: well within what the maker states for the device.
+/// Maximum force (N): well within what the maker states for the device.
 const MOST_FORCE: f64 = 4.0;
 
 /// Time after which a command that is not renewed is dropped.
@@ -49,7 +49,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// How long a connection, the handshake or an answer is waited for, in however many pieces it comes.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Longest message of the service [bytes]: an inventory of many devices has some thousand.
+/// Longest message of the service (bytes): an inventory of many devices has some thousand.
 const LONGEST_MESSAGE: usize = 1 << 20;
 
 /// Message of the thread to the loop.

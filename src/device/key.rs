@@ -9,10 +9,10 @@ use std::sync::{
     atomic::{AtomicU32, Ordering},
 };
 
-/// Time after the first press for which the key counts as held [s]: keyboards begin to repeat after 0.25 to 0.66 s.
+/// Time after the first press for which the key counts as held (s): keyboards begin to repeat after 0.25 to 0.66 s.
 pub const FIRST: f64 = 0.75;
 
-/// Time after a repetition for which the key counts as held [s]: keyboards repeat at 10 to 30 Hz.
+/// Time after a repetition for which the key counts as held (s): keyboards repeat at 10 to 30 Hz.
 pub const REPEATED: f64 = 0.2;
 
 /// The key as the real-time thread sees it.
@@ -20,9 +20,9 @@ pub const REPEATED: f64 = 0.2;
 pub struct Key {
     presses: Arc<AtomicU32>,
     seen: u32,
-    /// Since the last press [s].
+    /// Since the last press (s).
     since: f64,
-    /// How long the last press counts [s]; zero while the key is up.
+    /// How long the last press counts (s); zero while the key is up.
     counts: f64,
 }
 
@@ -38,7 +38,7 @@ impl Key {
         (Self { presses: Arc::clone(&presses), seen: 0, since: 0.0, counts: 0.0 }, KeyInput(presses))
     }
 
-    /// Lets `elapsed` [s] pass.
+    /// Lets `elapsed` (s) pass.
     pub(super) fn pass(&mut self, elapsed: f64) {
         self.since += elapsed;
         let presses = self.presses.load(Ordering::Acquire);

@@ -2,7 +2,7 @@
 //! that both do the same work.
 //!
 //! The joints of a parallelogram are measured against the ground where a serial chain's are relative; the rows of A
-//! subtract them. For a Cartesian device q is a position in the scene [m] and A turns (and scales) the device's axes.
+//! subtract them. For a Cartesian device q is a position in the scene (m) and A turns (and scales) the device's axes.
 
 use crate::{JointVector, MAX_JOINTS};
 use faer::{Mat, linalg::solvers::DenseSolveCore};
@@ -15,7 +15,7 @@ pub struct LinearMap {
     matrix: [[f64; MAX_JOINTS]; MAX_JOINTS],
     /// A^-1, by rows.
     inverse: [[f64; MAX_JOINTS]; MAX_JOINTS],
-    /// b [rad or m].
+    /// b (rad or m).
     offset: JointVector,
 }
 
@@ -34,7 +34,7 @@ pub enum MapError {
     Singular,
 }
 
-/// Largest deviation of A A^-1 from the identity [1]: rounding of a well-conditioned matrix of order six stays a
+/// Largest deviation of A A^-1 from the identity (1): rounding of a well-conditioned matrix of order six stays a
 /// million times below it, that of a singular one is of order one.
 const INVERSE_ROUNDING: f64 = 1e-9;
 

@@ -65,11 +65,11 @@ use std::sync::Arc;
 
 /// A haptic device, real or simulated. Both calls come from the real-time thread: they must not allocate, lock or wait.
 pub trait Device: Send {
-    /// Position now, `elapsed` [s] after the last reading (0 at the first). Simulated devices move on by it, under the
+    /// Position now, `elapsed` (s) after the last reading (0 at the first). Simulated devices move on by it, under the
     /// torque applied last; for real ones time passes by itself.
     fn read(&mut self, elapsed: f64) -> Reading;
 
-    /// Holds `torque` [N m or N] until the next call, or as much of it as the device can. Returns what it holds.
+    /// Holds `torque` (N m or N) until the next call, or as much of it as the device can. Returns what it holds.
     fn apply(&mut self, torque: &JointVector) -> Applied;
 
     /// Returns what calls the loop, if the device owns the thread in which it may be driven.
@@ -81,7 +81,7 @@ pub trait Device: Send {
 /// The torque that a device made of one that it was given.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Applied {
-    /// Torque that it holds until the next tick [N m or N].
+    /// Torque that it holds until the next tick (N m or N).
     pub torque: JointVector,
     /// Why that is less than what was asked for.
     pub clamps: Clamps,
@@ -100,10 +100,10 @@ impl Applied {
 /// A report of a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// y [rad or m].
+    /// y (rad or m).
     pub position: JointVector,
-    /// Time since the position was measured [s].
+    /// Time since the position was measured (s).
     pub age: f64,
-    /// Where the hand wants the device, if that is known; else the position [rad or m].
+    /// Where the hand wants the device, if that is known; else the position (rad or m).
     pub hand: JointVector,
 }

@@ -46,7 +46,7 @@ pub enum MotionError {
     Time {
         /// Number of the waypoint, from one.
         waypoint: usize,
-        /// Its time [s].
+        /// Its time (s).
         time: f64,
     },
     /// A waypoint has another number of joints than the proxy, or a coordinate that is none.
@@ -62,15 +62,15 @@ pub enum MotionError {
     /// A position is beyond the limits of its joint.
     #[error("at {time} s joint {joint} is at {position}, beyond its limits [{least}, {greatest}]{hint}")]
     Limits {
-        /// When [s].
+        /// When (s).
         time: f64,
         /// Name of the joint.
         joint: String,
-        /// Its position [rad or m].
+        /// Its position (rad or m).
         position: f64,
-        /// Its least position [rad or m].
+        /// Its least position (rad or m).
         least: f64,
-        /// Its greatest position [rad or m].
+        /// Its greatest position (rad or m).
         greatest: f64,
         /// What may be the cause, in words, or nothing.
         hint: &'static str,
@@ -104,7 +104,7 @@ pub enum MotionError {
     },
 }
 
-/// Largest file that is read [bytes]: a day of six joints at 20 Hz, or an hour at 1 kHz.
+/// Largest file that is read (bytes): a day of six joints at 20 Hz, or an hour at 1 kHz.
 const GREATEST_FILE: u64 = 256 << 20;
 
 impl Motion {
@@ -220,13 +220,13 @@ impl Motion {
         self.waypoints.first().map_or(0, |point| point.q.len())
     }
 
-    /// When the motion has come to its end [s].
+    /// When the motion has come to its end (s).
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.waypoints.last().map_or(0.0, |point| point.time)
     }
 
-    /// Position [rad or m] and velocity [rad/s or m/s] at `time` [s].
+    /// Position (rad or m) and velocity (rad/s or m/s) at `time` (s).
     #[must_use]
     pub fn at(&self, time: f64) -> (JointVector, JointVector) {
         let next = self.waypoints.partition_point(|point| point.time <= time);

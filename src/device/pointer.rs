@@ -22,7 +22,7 @@ pub struct PointerInput {
 }
 
 impl Pointer {
-    /// The hand and device of `spec`, at rest at `start` [rad or m], and what moves the hand.
+    /// The hand and device of `spec`, at rest at `start` (rad or m), and what moves the hand.
     ///
     /// # Errors
     /// When the joints do not fit, hand and device have no inertia, or `start` is no place.
@@ -35,7 +35,7 @@ impl Pointer {
 }
 
 impl PointerInput {
-    /// From now on the hand wants to be at `place` [rad or m]. Never waits.
+    /// From now on the hand wants to be at `place` (rad or m). Never waits.
     ///
     /// # Errors
     /// When `place` has another number of joints or a coordinate that is none; the hand then keeps its last goal.

@@ -16,7 +16,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Part of the period that must have passed before a reading counts as the next [1]: calls come a little early and
+/// Part of the period that must have passed before a reading counts as the next (1): calls come a little early and
 /// late, and every second one is wanted at half the rate.
 const PASSED: f64 = 0.75;
 
@@ -36,7 +36,7 @@ pub struct Ticker {
     orders: triple_buffer::Output<Order>,
     reports: triple_buffer::Input<(Reading, Applied)>,
     shared: Arc<Shared>,
-    /// Number of the last order, and the time since it came [s].
+    /// Number of the last order, and the time since it came (s).
     known: u64,
     silent: f64,
 }
@@ -52,7 +52,7 @@ pub struct Relayed {
 /// The state that both ends share.
 #[derive(Default)]
 struct Shared {
-    /// Time of the last call, since the first [ns].
+    /// Time of the last call, since the first (ns).
     time: AtomicU64,
     /// Whether the program is done.
     over: AtomicBool,
@@ -120,13 +120,13 @@ impl<F: Fn()> Drop for OnDrop<F> {
 /// Waits for readings.
 pub struct Wait {
     shared: Arc<Shared>,
-    /// Time of the last one [ns].
+    /// Time of the last one (ns).
     last: u64,
 }
 
 impl Wait {
-    /// Waits for the reading that comes `period` [s] after the last, or the end of the library's calls. Returns the
-    /// time since the last [s].
+    /// Waits for the reading that comes `period` (s) after the last, or the end of the library's calls. Returns the
+    /// time since the last (s).
     pub fn wait(&mut self, period: f64) -> f64 {
         let due = self.last + (PASSED * period * 1e9) as u64;
         loop {
@@ -140,7 +140,7 @@ impl Wait {
 }
 
 impl Ticker {
-    /// One call of the library's thread, `elapsed` [s] after the last. False when it is to be the last one.
+    /// One call of the library's thread, `elapsed` (s) after the last. False when it is to be the last one.
     pub fn tick(&mut self, elapsed: f64) -> bool {
         let over = self.shared.over.load(Ordering::Acquire);
         let reading = self.device.read(elapsed);

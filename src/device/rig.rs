@@ -18,7 +18,7 @@ pub struct DeviceRig<'a> {
     simulated: bool,
     /// Says that a hand holds the device.
     hand: Option<Key>,
-    /// Waits until `period` [s] after the last tick; returns the time since then [s].
+    /// Waits until `period` (s) after the last tick; returns the time since then (s).
     wait: Box<dyn FnMut(f64) -> f64 + 'a>,
     /// Ends the scan at once, not after the current point: motors are on.
     stop: &'a AtomicBool,

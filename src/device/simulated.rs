@@ -45,9 +45,9 @@ impl Failure {
 pub struct Script {
     /// How.
     pub failure: Failure,
-    /// From this time on [s].
+    /// From this time on (s).
     pub from: f64,
-    /// Until this time [s].
+    /// Until this time (s).
     pub until: f64,
 }
 

@@ -26,15 +26,15 @@ pub struct TipDevice {
     chain: Chain,
     pose: Pose,
     node: usize,
-    /// K [N/m], B [N s/m].
+    /// K (N/m), B (N s/m).
     stiffness: f64,
     damping: f64,
-    /// M [kg m^2 or kg], D [N m s/rad or N s/m].
+    /// M (kg m^2 or kg), D (N m s/rad or N s/m).
     inertia: JointVector,
     joint_damping: JointVector,
     position: JointVector,
     velocity: JointVector,
-    /// From the loop [N m or N].
+    /// From the loop (N m or N).
     torque: JointVector,
     tip: DVec3,
     tip_velocity: DVec3,
@@ -73,7 +73,7 @@ impl TipDevice {
         }
     }
 
-    /// Returns F, the spring's and damper's force on the node [N].
+    /// Returns F, the spring's and damper's force on the node (N).
     #[must_use]
     pub fn force(&self) -> DVec3 {
         let mut node_velocity = DVec3::ZERO;
@@ -83,14 +83,14 @@ impl TipDevice {
         self.stiffness * (self.tip - self.pose.nodes[self.node]) + self.damping * (self.tip_velocity - node_velocity)
     }
 
-    /// Returns the energy that arm and spring hold [J].
+    /// Returns the energy that arm and spring hold (J).
     #[must_use]
     pub fn energy(&self) -> f64 {
         let kinetic = self.velocity.iter().zip(self.inertia.iter()).map(|(v, m)| 0.5 * m * v * v).sum::<f64>();
         kinetic + 0.5 * self.stiffness * (self.tip - self.pose.nodes[self.node]).length_squared()
     }
 
-    /// Moves the arm on by `time` [s].
+    /// Moves the arm on by `time` (s).
     fn step(&mut self, time: f64) {
         let joints = self.position.len();
         let half = 0.5 * time;

@@ -52,7 +52,7 @@ pub fn check_rows(configurations: &[f64], joints: usize) -> Result<usize, BatchE
 }
 
 /// Fills the rows of `out` on all cores: `write` makes each of a configuration, a row of `joints` coordinates
-/// [rad or m]. Few rows are filled on the calling thread.
+/// (rad or m). Few rows are filled on the calling thread.
 ///
 /// # Errors
 /// When `configurations` are not whole rows of finite numbers, or `out` is not as many whole rows.
@@ -91,9 +91,9 @@ fn fill<T: Send>(
 }
 
 impl TorqueField {
-    /// Torques at `configurations`, one entry per joint in each row of both [rad or m; N m or N], on all cores; and
-    /// where it is asked for the number of the status of each, as [`Sample::status`] reports it. The same numbers as
-    /// [`TorqueField::sample`] gives.
+    /// Torques at `configurations`, one entry per joint in each row of both (rad or m; N m or N), on all cores; and
+    /// where it is asked for the number of the status of each, as [`Sample::status`](super::Sample::status) reports it.
+    /// The same numbers as [`TorqueField::sample`] gives.
     ///
     /// # Errors
     /// When the lengths do not fit, or a coordinate is not finite.

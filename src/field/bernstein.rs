@@ -82,7 +82,7 @@ impl Bernstein {
         self.coefficients.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Bounds over the cell, of which there are `per_step` [1/rad or 1/m] in a unit of each joint; zero along an axis
+    /// Bounds over the cell, of which there are `per_step` (1/rad or 1/m) in a unit of each joint; zero along an axis
     /// without extent.
     pub fn bounds(&self, per_step: &JointVector) -> Bounds {
         let (joints, n) = (self.joints, self.degree as f64);

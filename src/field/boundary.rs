@@ -37,18 +37,18 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 /// The layer of one grid.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundaryLayer {
-    /// 1 / Ks_a [rad/(N m)].
+    /// 1 / Ks_a (rad/(N m)).
     compliance: JointVector,
-    /// g [1/sqrt(J)].
+    /// g (1/sqrt(J)).
     density: f64,
 }
 
 /// Stands for the depth where there is no free point: beyond any grid, and finite, so that a weight of zero times it is
-/// zero [sqrt(J)].
+/// zero (sqrt(J)).
 const NOTHING_FREE: f64 = 1e100;
 
 impl BoundaryLayer {
-    /// A layer of slope `slope` Ks, one positive number per joint [N m/rad].
+    /// A layer of slope `slope` Ks, one positive number per joint (N m/rad).
     #[must_use]
     pub fn new(lattice: &Lattice, slope: &JointVector) -> Self {
         let mut compliance = *slope;
@@ -57,21 +57,21 @@ impl BoundaryLayer {
         Self { compliance, density: density.sqrt() }
     }
 
-    /// `|torque|_K` [sqrt(J)].
+    /// `|torque|_K` (sqrt(J)).
     #[must_use]
     pub fn size(&self, torque: &[f64]) -> f64 {
         torque.iter().zip(self.compliance.iter()).map(|(tau, c)| tau * tau * c).sum::<f64>().sqrt()
     }
 
-    /// The factor that shortens `torque` [N m] to `depth` [sqrt(J)]; one where it is short enough.
+    /// The factor that shortens `torque` (N m) to `depth` (sqrt(J)); one where it is short enough.
     #[must_use]
     pub fn share(&self, torque: &[f64], depth: f64) -> f64 {
         let (depth, size) = (depth.max(0.0), self.size(torque));
         if size > depth { depth / size } else { 1.0 }
     }
 
-    /// Depth of each grid point behind the boundary where the contact index is `threshold` Ith [sqrt(J)]. `greatest`:
-    /// largest size of a torque in the dataset [sqrt(J)]; depths beyond it are not distinguished, since nothing is held
+    /// Depth of each grid point behind the boundary where the contact index is `threshold` Ith (sqrt(J)). `greatest`:
+    /// largest size of a torque in the dataset (sqrt(J)); depths beyond it are not distinguished, since nothing is held
     /// back there.
     #[must_use]
     pub fn depths_behind_index(&self, lattice: &Lattice, free: &[bool], threshold: f64, greatest: f64) -> Vec<f64> {
@@ -85,7 +85,7 @@ impl BoundaryLayer {
         free.iter().zip(&beyond).map(level).map(|level| (level - threshold) / self.density).collect()
     }
 
-    /// Distance [sqrt(J)] of each grid point from those that `origins` marks, or `farthest` where that is less.
+    /// Distance (sqrt(J)) of each grid point from those that `origins` marks, or `farthest` where that is less.
     ///
     /// Points are settled in the order of their distance, each from its settled neighbours.
     fn distances(&self, lattice: &Lattice, origins: &[bool], farthest: f64) -> Vec<f64> {

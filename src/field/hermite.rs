@@ -19,14 +19,14 @@ use crate::JointVector;
 /// An interpolated function.
 pub(super) struct Hermite {
     joints: usize,
-    /// 1 / h along each axis [1/rad or 1/m].
+    /// 1 / h along each axis (1/rad or 1/m).
     per_step: JointVector,
     /// 2^d numbers a grid point.
     derivatives: Vec<f64>,
 }
 
 impl Hermite {
-    /// Returns the memory of the polynomials on `lattice` [bytes].
+    /// Returns the memory of the polynomials on `lattice` (bytes).
     pub fn bytes(lattice: &Lattice) -> usize {
         lattice.points().saturating_mul(size_of::<f64>() << lattice.joints())
     }

@@ -26,9 +26,9 @@ pub(super) struct Layered {
 /// The interpolated numbers of a record.
 pub(super) struct Interpolated {
     pub torque: JointVector,
-    /// Below the boundary [sqrt(J)].
+    /// Below the boundary (sqrt(J)).
     pub depth: f64,
-    /// U [J].
+    /// U (J).
     pub energy: f64,
     /// Factor of the layer on the torque, 0 to 1.
     pub held: f64,
@@ -51,7 +51,7 @@ impl Layered {
         Ok(field)
     }
 
-    /// Largest size of a torque [sqrt(J)].
+    /// Largest size of a torque (sqrt(J)).
     fn greatest(&self, data: &Checked<'_>) -> f64 {
         let joints = data.lattice.joints();
         let sizes = self.records.chunks_exact(joints + 2).map(|record| self.layer.size(&record[..joints]));

@@ -76,7 +76,7 @@ enum Interpolant {
 /// The field at one configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// tau_bar on the proxy [N m or N].
+    /// tau_bar on the proxy (N m or N).
     pub torque: JointVector,
     /// Interpolated contact index, 0 to 1.
     pub index: f64,
@@ -85,7 +85,7 @@ pub struct Sample {
     pub contact: bool,
     /// Object nodes in contact at the heaviest corner in contact; 0 out of contact.
     pub contact_nodes: u32,
-    /// Interpolated energy U of the object [J]; zero for datasets without it.
+    /// Interpolated energy U of the object (J); zero for datasets without it.
     pub energy: f64,
     /// Factor on interpolated contact forces, 0 to 1, so that they begin at the boundary and fade with the torque.
     pub share: f64,
@@ -119,8 +119,8 @@ struct Corners {
 }
 
 impl TorqueField {
-    /// The paper's interpolation, [`Interpolation::Linear`], over `dataset`. `threshold`: Ith [1]; `slope`: Ks of the
-    /// boundary layer, one per joint [N m/rad].
+    /// The paper's interpolation, [`Interpolation::Linear`], over `dataset`. `threshold`: Ith (1); `slope`: Ks of the
+    /// boundary layer, one per joint (N m/rad).
     ///
     /// # Errors
     /// When the dataset is not consistent, holds numbers that are not finite, or a parameter is out of its range.
@@ -192,7 +192,7 @@ impl TorqueField {
     }
 
     /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
-    /// `slopes`, one per joint [N m/rad]: no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
+    /// `slopes`, one per joint (N m/rad): no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
     /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
     ///
     /// A store that grows is bounded as it is when this is called. All cells are searched the first time, and not again

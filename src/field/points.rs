@@ -63,14 +63,14 @@ impl Checked<'_> {
         Ok(torque)
     }
 
-    /// Lower triangle of d tau/d q of `point` [N m/rad], where it is known and belongs to the energy.
+    /// Lower triangle of d tau/d q of `point` (N m/rad), where it is known and belongs to the energy.
     pub fn tangent(&self, point: usize) -> Option<&[f32]> {
         let entries = JointMatrix::entries(self.lattice.joints());
         let tangent = self.dataset.tangent.as_ref()?.get(point * entries..(point + 1) * entries)?;
         (self.points[point].is_converged() && tangent.iter().any(|entry| *entry != 0.0)).then_some(tangent)
     }
 
-    /// U of `point`, or of the nearest that was computed; zero where the dataset has none [J].
+    /// U of `point`, or of the nearest that was computed; zero where the dataset has none (J).
     pub fn energy(&self, point: usize) -> Result<f64, FieldError> {
         let source = self.nearest[point];
         let energy = self.dataset.energy.as_ref().map_or(0.0, |energy| energy[source]);

@@ -36,21 +36,21 @@ use super::{
 use crate::{JointVector, contact::RESIDUAL_FLOOR, memory};
 use rayon::prelude::*;
 
-/// Least stored energy over that of free space whose square root is distinguished from zero [J]: a nanonewton over a
+/// Least stored energy over that of free space whose square root is distinguished from zero (J): a nanonewton over a
 /// femtometre, as in [`RESIDUAL_FLOOR`].
 pub const LEAST_ENERGY: f64 = RESIDUAL_FLOOR * RESIDUAL_FLOOR;
 
 /// The potential of one dataset.
 pub(super) struct Potential {
     root: Hermite,
-    /// U without contact [J].
+    /// U without contact (J).
     free_energy: f64,
 }
 
 /// The potential at one configuration.
 pub(super) struct Gradient {
     pub torque: JointVector,
-    /// U [J].
+    /// U (J).
     pub energy: f64,
     /// Whether w is positive.
     pub contact: bool,

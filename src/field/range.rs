@@ -4,7 +4,7 @@
 //! the middle of the object. So the range ends at the grid like a joint at its limit: the proxy is stopped there, and
 //! the virtual coupling holds the device with its stiffness Kvc, to which the passivity bounds of the coupling apply.
 //!
-//! *Free space beyond the grid* belongs to the range where it is proven free. The clearance c(x) [m] is a lower bound
+//! *Free space beyond the grid* belongs to the range where it is proven free. The clearance c(x) (m) is a lower bound
 //! of the distance between proxy and object, the greater of
 //! - `gap_p - sum_a r_a |x_a - q_pa|`, the greatest over all grid points p: no node moves by more than r_a for a unit
 //!   of joint a (the greatest of [`Chain::jacobian_bounds`]);
@@ -35,10 +35,10 @@ use glam::DVec3;
 /// second of steps towards the object a nanometre.
 const CREEP: f64 = 1e-12;
 
-/// By how much rounding may carry x over the grid's border, over the spacing [1].
+/// By how much rounding may carry x over the grid's border, over the spacing (1).
 const RIM: f64 = 1e-9;
 
-/// Least and greatest coordinate of each joint [rad or m].
+/// Least and greatest coordinate of each joint (rad or m).
 pub type Stops = [[f64; 2]; MAX_JOINTS];
 
 /// The haptized range of a dataset.
@@ -53,9 +53,9 @@ pub struct HaptizedRange {
 struct Beyond {
     /// Joints that can leave the grid.
     open: [bool; MAX_JOINTS],
-    /// c at each grid point, zero in contact [m; steps for measured datasets].
+    /// c at each grid point, zero in contact (m; steps for measured datasets).
     clearances: Vec<f32>,
-    /// r_a [m/rad, or 1; 1/rad or 1/m for measured datasets].
+    /// r_a (m/rad, or 1; 1/rad or 1/m for measured datasets).
     levers: JointVector,
     /// Absent for measured datasets.
     object: Option<Surroundings>,
@@ -83,7 +83,7 @@ fn spread(lattice: &Lattice, levers: &JointVector, clearances: &mut [f32]) {
 /// The proxy beside the object's box.
 struct Surroundings {
     chain: Chain,
-    /// Least and greatest corner [m].
+    /// Least and greatest corner (m).
     corners: [DVec3; 2],
 }
 
@@ -139,7 +139,7 @@ impl HaptizedRange {
         Ok(range)
     }
 
-    /// The stops of a step of `interval` T [s] from `x` at `velocity`, within `limits`, between which x lies. Never
+    /// The stops of a step of `interval` T (s) from `x` at `velocity`, within `limits`, between which x lies. Never
     /// allocates.
     #[must_use]
     pub fn stops(&self, x: &JointVector, velocity: &JointVector, interval: f64, limits: &Stops) -> Stops {
@@ -219,7 +219,7 @@ impl Surroundings {
         Some(Self { chain: chain.clone(), corners })
     }
 
-    /// Least distance of the proxy's nodes at `x` from the box [m]; negative inside by no more than a node's radius.
+    /// Least distance of the proxy's nodes at `x` from the box (m); negative inside by no more than a node's radius.
     fn distance(&self, x: &JointVector) -> f64 {
         let links = self.chain.links(x);
         let of_node = |(i, node): (usize, &Node)| {

@@ -3,14 +3,14 @@
 use super::{TorqueField, stencil::Lattice};
 use crate::MAX_JOINTS;
 
-/// Step of the differences that give the slope of an interpolated torque, over the grid's own step [1]: the cube root
+/// Step of the differences that give the slope of an interpolated torque, over the grid's own step (1): the cube root
 /// of the rounding of f64, where what is rounded and what is left out are alike. Rounding costs 1e-11 of the torque for
 /// each grid step, and along a polynomial piece of degree three what is left out is as little.
 pub const GRADIENT_STEP: f64 = 1e-5;
 
 impl TorqueField {
     /// The slope d tau/d q at `q`, row by row: entry `k d + l` of `slope` is the change of tau_k with q_l
-    /// [N m/rad, or what follows of prismatic joints]. Central differences of the interpolated torque; on a face of a
+    /// (N m/rad, or what follows of prismatic joints). Central differences of the interpolated torque; on a face of a
     /// cell, where that has a kink, the mean of both sides. `slope` has d^2 entries. Never allocates.
     pub fn slope(&self, q: &[f64], slope: &mut [f64]) {
         let joints = self.joints();

@@ -111,17 +111,17 @@ impl Lattice {
         self.points
     }
 
-    /// Number of points, spacing [rad or m] and stride in the numbering of points of each axis.
+    /// Number of points, spacing (rad or m) and stride in the numbering of points of each axis.
     pub(super) fn lines(&self) -> impl Iterator<Item = (usize, f64, usize)> {
         self.axes[..self.joints].iter().map(|line| (line.count, line.step, line.stride))
     }
 
-    /// First and last coordinate of each axis [rad or m].
+    /// First and last coordinate of each axis (rad or m).
     pub(super) fn ends(&self) -> impl Iterator<Item = [f64; 2]> {
         self.axes[..self.joints].iter().map(|line| [line.start, line.end])
     }
 
-    /// Coordinates of the grid lines of each axis [rad or m].
+    /// Coordinates of the grid lines of each axis (rad or m).
     pub(super) fn grid_lines(&self) -> impl Iterator<Item = impl Iterator<Item = f64>> {
         self.axes[..self.joints].iter().map(|line| (0..line.count).map(|k| line.start + k as f64 * line.step))
     }

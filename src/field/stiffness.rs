@@ -3,11 +3,11 @@
 use crate::{JointVector, proxy::JointMatrix};
 use std::sync::{Mutex, PoisonError};
 
-/// Bounds of the entries of d tau/d q over one cell [N m/rad, or what follows of prismatic joints].
+/// Bounds of the entries of d tau/d q over one cell (N m/rad, or what follows of prismatic joints).
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stiffness {
     entries: JointMatrix,
-    /// Square of the Frobenius norm of `S^-1/2 E S^-1/2`, E of these entries, S = diag(slopes) [1].
+    /// Square of the Frobenius norm of `S^-1/2 E S^-1/2`, E of these entries, S = diag(slopes) (1).
     square: f64,
 }
 
@@ -29,7 +29,7 @@ impl Stiffness {
     }
 }
 
-/// How far the ratios of two vectors' entries may be apart where one is a multiple of the other [1]: some roundings of
+/// How far the ratios of two vectors' entries may be apart where one is a multiple of the other (1): some roundings of
 /// factors that are applied entry by entry.
 const ROUNDINGS: f64 = 8.0 * f64::EPSILON;
 

@@ -63,7 +63,7 @@ fn contact_begins_where_the_index_passes_its_threshold() {
 }
 
 /// Steepest change of torque along a winding path through and out of a grid of `count` points 0.2 apart an axis,
-/// centred on zero [N m/rad].
+/// centred on zero (N m/rad).
 fn steepest(field: &TorqueField, count: usize, reach: f64) -> f64 {
     let half = 0.1 * (count - 1) as f64 * reach;
     let place = |k: f64| {

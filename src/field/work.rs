@@ -10,7 +10,7 @@ use super::TorqueField;
 use crate::JointVector;
 
 /// Difference, relative to the integral of the power's size over the whole line, at which one stretch of a work
-/// integral is good enough [1]: fractions of a cell are rounded by some tens of eps, and the torque with them.
+/// integral is good enough (1): fractions of a cell are rounded by some tens of eps, and the torque with them.
 const WORK_ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Halvings of a stretch in a work integral at most: a kink of the torque within it then spoils 1e-9 of it, and, since
@@ -21,7 +21,7 @@ const WORK_HALVINGS: u32 = 30;
 /// boundaries; where rounding keeps more stretches from agreeing, further halves would only add to it.
 const WORK_STRETCHES: u32 = 32 * WORK_HALVINGS;
 
-/// Nodes in (0, 1] and weights of Lobatto's formula of ten points on [-1, 1]. It looks at the ends, too: where the
+/// Nodes in (0, 1] and weights of Lobatto's formula of ten points on `[-1, 1]`. It looks at the ends, too: where the
 /// torque begins or ends within a stretch, the whole and its halves cannot agree by not seeing it.
 const LOBATTO: [(f64, f64); 5] = [
     (0.165_278_957_666_387_02, 0.327_539_761_183_897_6),
@@ -32,7 +32,7 @@ const LOBATTO: [(f64, f64); 5] = [
 ];
 
 impl TorqueField {
-    /// Work of the torque on the proxy along the straight line `from`..`to` [J]. Not for the haptic loop.
+    /// Work of the torque on the proxy along the straight line `from`..`to` (J). Not for the haptic loop.
     #[must_use]
     pub fn work(&self, from: &JointVector, to: &JointVector) -> f64 {
         let mut cuts = vec![0.0, 1.0];
@@ -47,14 +47,14 @@ impl TorqueField {
         stretches.into_iter().map(|stretch| self.stretch(from, to, stretch, tolerance)).sum()
     }
 
-    /// Work around the closed polygon with corners `path` [J].
+    /// Work around the closed polygon with corners `path` (J).
     #[must_use]
     pub fn work_around(&self, path: &[JointVector]) -> f64 {
         let next = path.iter().cycle().skip(1);
         path.iter().zip(next).map(|(from, to)| self.work(from, to)).sum()
     }
 
-    /// The work of one stretch, halved until two halves differ from the whole by no more than `tolerance` [J].
+    /// The work of one stretch, halved until two halves differ from the whole by no more than `tolerance` (J).
     fn stretch(
         &self,
         from: &JointVector,

@@ -67,7 +67,7 @@ pub struct AdapterSummary {
     pub kind: &'static str,
     /// True for a GPU made of silicon.
     pub hardware: bool,
-    /// Largest buffer that one binding reaches [B].
+    /// Largest buffer that one binding reaches (B).
     pub binding_limit: u64,
     /// Whether shaders may compute in f64: then contact or not is decided on the device, else within a band by the CPU.
     pub double: bool,

@@ -63,7 +63,7 @@ impl StorageBuffer {
         Ok(Self { raw })
     }
 
-    /// Size [B].
+    /// Size (B).
     #[must_use]
     pub fn size(&self) -> u64 {
         self.raw.size()

@@ -24,7 +24,7 @@ pub struct Binding {
     /// Name in the shader.
     pub name: String,
     ty: wgpu::BufferBindingType,
-    /// Least size of the buffer: that of the struct, or of one element [B].
+    /// Least size of the buffer: that of the struct, or of one element (B).
     least: u64,
 }
 

@@ -177,7 +177,7 @@ impl Context {
         (self.instance.clone(), self.opened.clone(), self.device.clone(), self.queue.clone())
     }
 
-    /// Largest buffer that one binding reaches [B].
+    /// Largest buffer that one binding reaches (B).
     #[must_use]
     pub fn binding_limit(&self) -> u64 {
         let limits = self.device.limits();

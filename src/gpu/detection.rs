@@ -64,7 +64,7 @@ pub(super) struct Detection {
     kinematics: BoundKernel,
     distances: BoundKernel,
     smallest: BoundKernel,
-    /// Bytes that `kinematics`, `distances` and `smallest` read of arm and surface [B].
+    /// Bytes that `kinematics`, `distances` and `smallest` read of arm and surface (B).
     model_bytes: [u64; 3],
 }
 
@@ -186,7 +186,7 @@ impl Detection {
         Ok(detected)
     }
 
-    /// Bytes of the gaps of `count` configurations [B].
+    /// Bytes of the gaps of `count` configurations (B).
     fn gap_bytes(&self, count: u32) -> u64 {
         self.trust.precision.size() as u64 * u64::from(count)
     }

@@ -14,7 +14,7 @@ pub struct Dispatch<'a> {
     pub bound: &'a wgpu::BindGroup,
     /// Number of workgroups.
     pub workgroups: u32,
-    /// Bytes that it reads and writes, each element once, twice where it does both [B].
+    /// Bytes that it reads and writes, each element once, twice where it does both (B).
     pub bytes: u64,
 }
 

@@ -49,9 +49,9 @@ pub enum GpuError {
     TooLarge {
         /// Which buffer.
         what: &'static str,
-        /// Its size [B].
+        /// Its size (B).
         needed: u64,
-        /// The limit [B].
+        /// The limit (B).
         limit: u64,
     },
     /// Only a part of a large object's compliance is formed, and whether the paper's iteration leaves that part is not

@@ -110,7 +110,7 @@ fn samples(count: usize) -> Vec<(DVec3, [DVec3; CONTROLS])> {
         .collect()
 }
 
-/// Greatest difference between numbers of about one after some hundred operations [1].
+/// Greatest difference between numbers of about one after some hundred operations (1).
 fn rounding(precision: Precision) -> f64 {
     match precision {
         Precision::Single => 1e-5,

@@ -62,7 +62,7 @@ impl AdaptiveSize {
 /// First size of sections: nothing is known of the device yet.
 const FIRST_SECTION: usize = 4096;
 
-/// Share of the room for searches that a section is to fill [1]: the next one may have a few more that touch.
+/// Share of the room for searches that a section is to fill (1): the next one may have a few more that touch.
 const FILLED: f64 = 0.9;
 
 /// A device, and how much it is given at a time.

@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// Invocations of a workgroup; the shader's default.
 const WORKGROUP: u32 = 64;
 
-/// Size of a node's force, displacement, velocity, or vector of the iteration [B].
+/// Size of a node's force, displacement, velocity, or vector of the iteration (B).
 const VECTOR: u64 = 16;
 
 /// Which solver.
@@ -38,7 +38,7 @@ pub enum FrameMethod {
 
 impl FrameMethod {
     /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground
-    /// are isotropic, else of 1,000 [B].
+    /// are isotropic, else of 1,000 (B).
     const MOST_BYTES_INVERTED: usize = 36_000_000;
 
     /// Enough iterations for objects whose springs reach a few dozen edges in one period.
@@ -103,7 +103,7 @@ pub struct FrameUpdate {
     forces: StorageBuffer,
     /// Forces, weight and what stiffening adds; absent without such effects.
     loads: Option<StorageBuffer>,
-    /// M g of each node [N]; none without gravity.
+    /// M g of each node (N); none without gravity.
     weight: Vec<DVec3>,
     /// The forces as the shader reads them.
     padded_forces: Vec<[f32; 4]>,
@@ -114,7 +114,7 @@ pub struct FrameUpdate {
 /// Resources of a frame update on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct FrameCost {
-    /// Memory of all its buffers [B].
+    /// Memory of all its buffers (B).
     pub bytes: u64,
     /// Number of its buffers.
     pub buffers: usize,
@@ -125,7 +125,7 @@ pub struct FrameCost {
 }
 
 impl FrameCost {
-    /// That of buffers of these sizes [B], and of stages.
+    /// That of buffers of these sizes (B), and of stages.
     fn of(buffers: &[u64], stages: &[FramePass]) -> Self {
         let mut pipelines: Vec<_> = stages.iter().map(|stage| Arc::as_ptr(&stage.kernel)).collect();
         pipelines.sort_unstable();
@@ -140,7 +140,7 @@ impl FrameCost {
 }
 
 impl FrameUpdate {
-    /// The object in equilibrium under no forces but its weight, where there is one, to be advanced by `period` [s] a
+    /// The object in equilibrium under no forces but its weight, where there is one, to be advanced by `period` (s) a
     /// frame. Smoothing is no matter of the device: forces are filtered before they come here.
     ///
     /// # Errors
@@ -208,7 +208,7 @@ impl FrameUpdate {
         self.takes
     }
 
-    /// Advances by one frame under `forces`, one per node [N]; missing ones count as zero. Does not wait for the
+    /// Advances by one frame under `forces`, one per node (N); missing ones count as zero. Does not wait for the
     /// device.
     ///
     /// # Errors
@@ -232,7 +232,7 @@ impl FrameUpdate {
         self.context.check()
     }
 
-    /// Displacements u = n - n0 [m] and velocities [m/s] of all nodes; of quasi-static graphics no velocities. Waits
+    /// Displacements u = n - n0 (m) and velocities (m/s) of all nodes; of quasi-static graphics no velocities. Waits
     /// for the device.
     ///
     /// # Errors
@@ -251,14 +251,14 @@ impl FrameUpdate {
         &self.state.raw
     }
 
-    /// Contact forces of the last frame, four numbers a node [N].
+    /// Contact forces of the last frame, four numbers a node (N).
     #[must_use]
     pub fn force_buffer(&self) -> &wgpu::Buffer {
         &self.forces.raw
     }
 }
 
-/// State at the start: displacements under the nodes' `weight` [m], then velocities where there are any; four numbers a
+/// State at the start: displacements under the nodes' `weight` (m), then velocities where there are any; four numbers a
 /// node.
 fn start(
     object: &Object,
@@ -359,7 +359,7 @@ impl Common {
         })
     }
 
-    /// Sizes of the buffers [B].
+    /// Sizes of the buffers (B).
     fn sizes(&self) -> Vec<u64> {
         let Self { parameters: _, even, structure, blocks, inertia, forces, loads, state } = self;
         let always = [state, forces, structure, blocks, even];

@@ -200,13 +200,13 @@ fn random_questions(count: usize) -> Vec<Question> {
         .collect()
 }
 
-/// Rounding of a distance to plump triangles: sixteen roundings of their size, which is what closest_point adds up [m].
+/// Rounding of a distance to plump triangles: sixteen roundings of their size, which is what closest_point adds up (m).
 /// The weights are quotients of areas, whose rounding grows with the square of the triangle's aspect.
 fn distance_rounding(precision: Precision) -> f64 {
     16.0 * 0.02 * unit_rounding(precision)
 }
 
-/// Rounding of a number, relative to it [1].
+/// Rounding of a number, relative to it (1).
 fn unit_rounding(precision: Precision) -> f64 {
     match precision {
         Precision::Single => f64::from(f32::EPSILON) / 2.0,
@@ -325,7 +325,7 @@ fn proxy_nodes_are_placed_to_rounding() {
     }
 }
 
-/// Proxy nodes relative to the object's centre, three coordinates each [m].
+/// Proxy nodes relative to the object's centre, three coordinates each (m).
 fn place(precision: Precision, model: &Model<'_>, poses: &[Vec<f64>]) -> Vec<f64> {
     let chain = model.chain;
     let motion = |(q, joint): (&f64, &crate::scene::JointSpec)| match joint.kind {

@@ -14,24 +14,24 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Part of the band of gaps at rest within which contact or not is decided in f64, relative to the object's extent [1]:
+/// Part of the band of gaps at rest within which contact or not is decided in f64, relative to the object's extent (1):
 /// distances between coordinates of up to some extents are rounded by 6e-8 of each.
 const GPU_GAP_BAND_PER_EXTENT: f64 = 1e-6;
 
-/// The other part of the band, for each joint, relative to the chain's reach [1]: a joint turns a lever no longer than
+/// The other part of the band, for each joint, relative to the chain's reach (1): a joint turns a lever no longer than
 /// the reach by a cosine and a sine that are rounded by 6e-8 each, and rounds products and sums as often again; six of
 /// these roundings in all.
 const GPU_GAP_BAND_PER_JOINT: f64 = 4e-7;
 
-/// Widening of bounding spheres, relative to the object's extent [1]: coordinates of up to ten extents (a proxy node
+/// Widening of bounding spheres, relative to the object's extent (1): coordinates of up to ten extents (a proxy node
 /// far away) are rounded to f32 by 6e-8 each.
 const GPU_BOUND_SLACK: f64 = 1e-6;
 
-/// Gaps at rest up to which they are all known, relative to the object's extent [1]: what comes into contact as the
+/// Gaps at rest up to which they are all known, relative to the object's extent (1): what comes into contact as the
 /// surface moves was hardly farther. Where it was the closest facet takes longer to find, no more.
 const KNOWN_PER_EXTENT: f64 = 0.25;
 
-/// Greatest contact stiffness of the energy form in f32, in units of the stiffness of the object's softest node [1]: a
+/// Greatest contact stiffness of the energy form in f32, in units of the stiffness of the object's softest node (1): a
 /// depth is known to about 1e-6 of the object's displacement, a force to this many times that. What is stiffer is
 /// stiffened from there in f64, where nothing moves by more than a thousandth of its displacement.
 const GPU_STIFFNESS: f64 = 1e3;
@@ -51,13 +51,13 @@ pub struct DeviceModel {
     pub(super) surface: StorageBuffer,
     /// Whether its facets are bent.
     pub(super) is_smooth: bool,
-    /// Gaps in f32, to the flat triangles, are those to the contact surface but for this [m].
+    /// Gaps in f32, to the flat triangles, are those to the contact surface but for this (m).
     pub(super) gap_band: f64,
-    /// Gaps to the contact surface no farther than this from zero are left open [m].
+    /// Gaps to the contact surface no farther than this from zero are left open (m).
     pub(super) open_band: f64,
 }
 
-/// Contact stiffness of the energy form in f32 [N/m]; what is stiffer is stiffened when the result is settled in f64.
+/// Contact stiffness of the energy form in f32 (N/m); what is stiffer is stiffened when the result is settled in f64.
 pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
     model.kc.min(GPU_STIFFNESS / model.max_nodal_compliance)
 }
@@ -106,18 +106,18 @@ impl DeviceModel {
     }
 
     /// Size of what the proxy is tested against for contact at rest: of the flat triangles, and of the contact surface
-    /// [B].
+    /// (B).
     pub(super) fn surface_bytes(&self) -> [u64; 2] {
         [self.rest.size() + self.mesh.size() + self.order.size(), self.surface.size()]
     }
 }
 
-/// Greatest distance of a surface node to the object's centre [m].
+/// Greatest distance of a surface node to the object's centre (m).
 pub(super) fn extent(model: &contact::Model<'_>) -> f64 {
     model.surface.positions.iter().map(|n| n.length()).fold(0.0, f64::max)
 }
 
-/// Returns the margin of bounding spheres, for stages that compute in `precision` [m].
+/// Returns the margin of bounding spheres, for stages that compute in `precision` (m).
 pub(super) fn culling_slack(model: &contact::Model<'_>, precision: Precision) -> f64 {
     match precision {
         Precision::Single => GPU_BOUND_SLACK * extent(model),
@@ -130,14 +130,14 @@ pub(super) fn four(v: DVec3, fourth: f64) -> [f64; 4] {
     [v.x, v.y, v.z, fourth]
 }
 
-/// A sphere around `points`, widened by `slack`: centre and radius [m].
+/// A sphere around `points`, widened by `slack`: centre and radius (m).
 pub(super) fn sphere_around(points: &[DVec3], slack: f64) -> [f64; 4] {
     let centre = points.iter().sum::<DVec3>() / points.len() as f64;
     let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
     four(centre, radius + slack)
 }
 
-/// Distance from the object's centre that no proxy node ever exceeds [m].
+/// Distance from the object's centre that no proxy node ever exceeds (m).
 fn reach(chain: &proxy::Chain, centre: DVec3) -> f64 {
     let mut length = 0.0;
     let lengths: Vec<f64> = (chain.joints.iter().enumerate())
@@ -191,7 +191,7 @@ pub(super) fn joints_and_nodes(model: &contact::Model<'_>) -> Vec<f64> {
     numbers
 }
 
-/// The control points of facet `t` at rest, of a flat one its corners [m].
+/// The control points of facet `t` at rest, of a flat one its corners (m).
 pub(super) fn controls(model: &contact::Model<'_>, t: u32) -> Vec<DVec3> {
     let facet = model.surface.facet_at_rest(t);
     facet.net.map_or_else(|| facet.corners.to_vec(), |net| net.to_vec())
@@ -204,7 +204,7 @@ pub(super) fn leaves(model: &contact::Model<'_>) -> Vec<u32> {
     order
 }
 
-/// Spheres around the `points` of the facets, none of which lies outside these, widened by `slack` [m]: centre and
+/// Spheres around the `points` of the facets, none of which lies outside these, widened by `slack` (m): centre and
 /// radius of each node of the tree of `shaders/bounding_spheres.wgsl`.
 fn tree(model: &contact::Model<'_>, points: impl Fn(u32) -> Vec<DVec3>, slack: f64) -> Vec<[f64; 4]> {
     let order: Vec<u32> = model.surface.bounds.order().collect();

@@ -35,7 +35,7 @@ impl Default for BatchCapacity {
     }
 }
 
-/// Most memory that one buffer takes, on a GPU and on a software rasteriser, whose memory is the host's [B]. There are
+/// Most memory that one buffer takes, on a GPU and on a software rasteriser, whose memory is the host's (B). There are
 /// a few of such a size a section in flight. No adapter reports how much memory it has: where it runs out, there is
 /// another try with half the room.
 const HARDWARE_BUDGET: u64 = 128 << 20;
@@ -60,7 +60,7 @@ impl BatchCapacity {
         Self { chunk: self.chunk.clamp(1, fit(placed)), contacts, ..self }
     }
 
-    /// Cut to the memory that workspaces may take. Each part of one takes so many bytes, and has a binding of its own [B].
+    /// Cut to the memory that workspaces may take. Each part of one takes so many bytes, and has a binding of its own (B).
     fn for_workspaces(self, context: &Context, parts: [u64; 3]) -> Self {
         let budget = match context.adapter() {
             adapter if !adapter.hardware => SOFTWARE_WORKSPACES,

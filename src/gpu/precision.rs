@@ -10,7 +10,7 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Bytes of a number [B].
+    /// Bytes of a number (B).
     #[must_use]
     pub const fn size(self) -> usize {
         match self {

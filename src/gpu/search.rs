@@ -42,7 +42,7 @@ const STAGED_TOUCHES: usize = 16;
 /// differ little.
 const TOUCHES_MARGIN: f64 = 1.25;
 
-/// Bytes of a record, and of the words of a touch [B].
+/// Bytes of a record, and of the words of a touch (B).
 const WORDS_BYTES: usize = size_of::<[u32; 4]>();
 
 /// The kernels of the search.
@@ -113,7 +113,7 @@ impl Search {
         })
     }
 
-    /// Bytes of what the stages read of the object [B].
+    /// Bytes of what the stages read of the object (B).
     fn object_bytes(&self) -> u64 {
         let SearchModel { surface, mesh, compliance, .. } = &self.model;
         surface.size() + mesh.size() + compliance.size()
@@ -131,7 +131,7 @@ impl Search {
     }
 
     /// Bytes of the records, the amounts, and the words and numbers of `touches` touches, of `count` configurations
-    /// [B].
+    /// (B).
     fn result_bytes(&self, count: usize, touches: usize) -> [u64; 4] {
         let number = self.model.precision.size();
         let amounts = number * self.amounts_each() * count;

@@ -17,16 +17,16 @@ use crate::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Least relative residual that the f32 solver is asked for [1]: rounding of f32 (6e-8) grows over sums of about a
+/// Least relative residual that the f32 solver is asked for (1): rounding of f32 (6e-8) grows over sums of about a
 /// hundred products to a few 1e-6, so 1e-5 is the least that can be distinguished from zero.
 const GPU_LEAST_TOLERANCE: f64 = 1e-5;
 
 /// Distance of a node to an edge or vertex, relative to the object's extent, below which f32 does not resolve the
-/// direction between them [1]: coordinates of one extent carry 6e-8, and 16 times that gives a direction good to 6 %,
+/// direction between them (1): coordinates of one extent carry 6e-8, and 16 times that gives a direction good to 6 %,
 /// where the pseudonormal is the better one.
 const GPU_LEAST_DISTANCE_PER_EXTENT: f64 = 1e-6;
 
-/// Rounding error of a depth, relative to the longest edge of the surface [1]: three coordinates of a corner relative
+/// Rounding error of a depth, relative to the longest edge of the surface (1): three coordinates of a corner relative
 /// to the proxy node, each rounded by 6e-8 of at most an edge, enter with weights that sum to one.
 const GPU_DEPTH_ROUNDING_PER_EDGE: f64 = 2e-7;
 
@@ -114,7 +114,7 @@ impl SearchModel {
     }
 
     /// Bytes of one workspace: of its words and its entries in two lists, of its reals, and of the vectors on its
-    /// support [B].
+    /// support (B).
     pub fn workspace(&self) -> [u64; 3] {
         let SearchParameters { words, reals, .. } = self.parameters;
         let size = self.precision.size() as u64;
@@ -303,7 +303,7 @@ impl Numbering {
         Self { places, nodes }
     }
 
-    /// The compliance with its rows and columns by place [m/N].
+    /// The compliance with its rows and columns by place (m/N).
     fn compliance(&self, model: &contact::Model<'_>) -> Vec<f64> {
         let (compliance, each) = (&model.compliance, model.compliance.rows_per_node);
         let from: Vec<usize> = self.nodes.iter().filter_map(|&node| compliance.place(node)).collect();

@@ -13,18 +13,18 @@ use crate::contact::{
 };
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
-/// Stands for "no distance yet" in f32 kernels [m]: above any distance in a scene, and its square is still finite.
+/// Stands for "no distance yet" in f32 kernels (m): above any distance in a scene, and its square is still finite.
 pub(super) const GPU_FAR_AWAY: f32 = 1e18;
 
 /// Least divisor in f32 kernels: a hundred times the least normal number (1.2e-38), below which a device may flush to
 /// zero. Squared edge lengths stay above it down to 1e-18 m.
 pub const GPU_LEAST_DIVISOR: f32 = 1e-36;
 
-/// Widening of distances within which f32 kernels search, relative to these [1]: they follow from sums of up to some
+/// Widening of distances within which f32 kernels search, relative to these (1): they follow from sums of up to some
 /// hundred products, each rounded by 6e-8.
 const GPU_SEARCH_SLACK: f64 = 1e-4;
 
-/// The least step of the search for the closest point of a bent facet, for f32 [1]: some roundings of a weight.
+/// The least step of the search for the closest point of a bent facet, for f32 (1): some roundings of a weight.
 const GPU_FACET_STEP: f64 = 4.0 * f32::EPSILON as f64;
 
 /// [`energy::ENERGY_ROUNDING`] for f32, whose eps is 1.2e-7.
@@ -37,7 +37,7 @@ const GPU_GIVE_UP_LENGTH: f64 = 1e-6;
 /// iterations.
 const GPU_INNER_TOLERANCE_FLOOR: f64 = 1e-4;
 
-/// Relative residual of the paper's step 2 in f32 [1]: ten times better than the least tolerance of the iteration.
+/// Relative residual of the paper's step 2 in f32 (1): ten times better than the least tolerance of the iteration.
 const GPU_PAPER_INNER_TOLERANCE: f64 = 1e-6;
 
 /// One entry point with everything it needs.

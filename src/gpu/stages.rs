@@ -7,7 +7,7 @@ use std::ops::Range;
 /// Where the proxy is.
 #[derive(Clone, Debug, Default)]
 pub struct Detected {
-    /// Smallest gap of each configuration at rest [m].
+    /// Smallest gap of each configuration at rest (m).
     pub gaps: Vec<f64>,
     /// Numbers of those in contact, in the order in which they are solved.
     pub touching: Vec<u32>,
@@ -82,7 +82,7 @@ impl Found {
 /// How far results can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trust {
-    /// Gaps no farther than this from zero are left open [m].
+    /// Gaps no farther than this from zero are left open (m).
     pub band: f64,
     /// Precision of the stages; equilibria in f32 are settled in f64 on the host.
     pub precision: Precision,

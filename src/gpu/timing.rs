@@ -18,10 +18,10 @@ pub struct KernelTime {
     pub dispatches: u64,
     /// Workgroups of all of them.
     pub workgroups: u64,
-    /// Time by the device's clock [s].
+    /// Time by the device's clock (s).
     pub seconds: f64,
     /// Bytes that had to be read or written, each element once a dispatch; what is read again from a cache is not
-    /// counted [B].
+    /// counted (B).
     pub bytes: u64,
 }
 
@@ -104,7 +104,7 @@ impl Stopwatch {
     }
 
     /// The time of every kernel since the last call, in the order in which they first ran. A tick of the clock takes
-    /// `period` [s]; `map` waits for the stamps and gives the host a view of them.
+    /// `period` (s); `map` waits for the stamps and gives the host a view of them.
     pub fn take_times(
         &self,
         period: f64,
@@ -205,7 +205,7 @@ mod tests {
         (scene, open.map(|open| Arc::new(open(AdapterChoice::Any).unwrap())))
     }
 
-    /// Each took some time, all together no more than went by: `wall` [s].
+    /// Each took some time, all together no more than went by: `wall` (s).
     fn plausible(times: &[KernelTime], wall: f64) {
         for kernel in times {
             assert!(kernel.seconds > 0.0 && kernel.dispatches > 0 && kernel.workgroups > 0, "{kernel:?}");

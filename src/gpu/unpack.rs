@@ -20,17 +20,17 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Largest relative residual of a GPU's result that is passed on as converged, however rough the scene's tolerance [1]:
+/// Largest relative residual of a GPU's result that is passed on as converged, however rough the scene's tolerance (1):
 /// what is promised of f32. What has more is solved in f64.
 pub const GPU_RESOLVED_RESIDUAL: f64 = 1e-4;
 
-/// Steps in f64 from a result of the f32 kernel at most [1]. They converge quadratically: where f32 found an
+/// Steps in f64 from a result of the f32 kernel at most (1). They converge quadratically: where f32 found an
 /// equilibrium, one leads from its 1e-5 to 1e-8. Four let contacts within rounding of none come and go; what needs more
 /// was not near one, and may end at another.
 const SETTLING_STEPS: u32 = 4;
 
 /// Residual of the contact forces of the energy form that is allowed after these steps unless the scene asks for less,
-/// relative, in the energy norm [1]: soft directions of a deep dent raise it a hundredfold in the torque, which is to
+/// relative, in the energy norm (1): soft directions of a deep dent raise it a hundredfold in the torque, which is to
 /// agree to 1e-5 with the CPU's.
 pub const GPU_SETTLED_RESIDUAL: f64 = 1e-7;
 

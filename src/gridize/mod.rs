@@ -62,9 +62,9 @@ pub enum Interpolation {
 /// Options of the grid.
 #[derive(Clone, Debug)]
 pub struct GridizeOptions {
-    /// Grid step of each joint [rad or m]; one number serves all joints.
+    /// Grid step of each joint (rad or m); one number serves all joints.
     pub steps: Vec<f64>,
-    /// Contact where the norm of the torque exceeds this, epsilon of section 3.1 [N m]. Absent: three times the median
+    /// Contact where the norm of the torque exceeds this, epsilon of section 3.1 (N m). Absent: three times the median
     /// standard deviation of the samples, or a hundredth of the greatest torque where none was measured.
     pub epsilon: Option<f64>,
     /// How torques are interpolated.
@@ -86,7 +86,7 @@ pub struct GridizeReport {
     pub inside: usize,
     /// Grid points in contact.
     pub contact_points: usize,
-    /// Torque threshold used [N m].
+    /// Torque threshold used (N m).
     pub epsilon: f64,
 }
 

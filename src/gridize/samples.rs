@@ -7,11 +7,11 @@ use crate::{MAX_JOINTS, dataset::JointLabel, random::mix};
 pub struct Samples {
     /// One label a joint; their number is d.
     pub joints: Vec<JointLabel>,
-    /// q, joint fastest: entry `sample * d + joint` [rad or m].
+    /// q, joint fastest: entry `sample * d + joint` (rad or m).
     pub configurations: Vec<f64>,
-    /// Contact torque on the proxy, laid out like `configurations` [N m or N].
+    /// Contact torque on the proxy, laid out like `configurations` (N m or N).
     pub torques: Vec<f64>,
-    /// Standard deviation of each torque, laid out alike, where it was measured [N m or N].
+    /// Standard deviation of each torque, laid out alike, where it was measured (N m or N).
     pub deviations: Option<Vec<f64>>,
 }
 

@@ -81,10 +81,10 @@ pub struct CellReport {
     pub cells: usize,
     /// Cells visited in both directions.
     pub both_directions: usize,
-    /// Mean of half the difference between the directions, a joint each: dry friction and backlash [N m].
+    /// Mean of half the difference between the directions, a joint each: dry friction and backlash (N m).
     pub hysteresis: Vec<f64>,
     /// Root mean square over cells of the standard deviation between visits, a joint each: what measuring again at the
-    /// same place in the same direction would give [N m].
+    /// same place in the same direction would give (N m).
     pub repeatability: Vec<f64>,
 }
 

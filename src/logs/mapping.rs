@@ -69,9 +69,9 @@ pub struct Time {
     /// Seconds a unit of that column.
     #[serde(default = "one")]
     pub scale: f64,
-    /// Time between rows where there is no column [s].
+    /// Time between rows where there is no column (s).
     pub period: Option<f64>,
-    /// A longer pause begins a new segment, across which nothing is filtered [s].
+    /// A longer pause begins a new segment, across which nothing is filtered (s).
     #[serde(default = "unlimited")]
     pub gap: f64,
 }
@@ -136,9 +136,9 @@ pub struct Torque {
     pub keep: Keep,
     /// Name of the joint whose direction of motion counts; absent: the first.
     pub lead: Option<String>,
-    /// Speed of the lead joint below which it counts as still [rad/s or m/s].
+    /// Speed of the lead joint below which it counts as still (rad/s or m/s).
     pub still: f64,
-    /// Rows are averaged in cells of C-space with these sides, one a joint [rad or m]; needed for all but `all`.
+    /// Rows are averaged in cells of C-space with these sides, one a joint (rad or m); needed for all but `all`.
     pub cell: Vec<f64>,
 }
 

@@ -204,7 +204,7 @@ pub fn import(
     import.finish(remedy)
 }
 
-/// Total size of `files`, for a progress bar [bytes].
+/// Total size of `files`, for a progress bar (bytes).
 #[must_use]
 pub fn total_size(files: &[impl AsRef<Path>]) -> u64 {
     files.iter().filter_map(|path| std::fs::metadata(path).ok()).map(|metadata| metadata.len()).sum()

@@ -7,7 +7,7 @@ use super::{
 use crate::{JointVector, csv::fields};
 use std::io::{BufRead, Read};
 
-/// Longest line that is read [bytes]; a binary file has no line ends.
+/// Longest line that is read (bytes); a binary file has no line ends.
 const LONGEST_LINE: u64 = 1 << 20;
 
 /// One usable row.
@@ -17,7 +17,7 @@ pub(super) struct Row {
     pub first: bool,
     /// Line in its file, from 1.
     pub line: u64,
-    /// [s]
+    /// (s)
     pub time: f64,
     pub q: JointVector,
     pub torque: JointVector,

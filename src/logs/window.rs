@@ -15,7 +15,7 @@ const OUTLIER_ROWS: usize = 5;
 /// A row with what its neighbours tell of it.
 pub(super) struct Seen {
     pub row: Row,
-    /// [rad/s or m/s]
+    /// (rad/s or m/s)
     pub speed: JointVector,
     pub outlier: bool,
 }

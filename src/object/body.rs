@@ -6,7 +6,7 @@ use glam::DVec3;
 /// The geometry of an object at rest, its surface nodes first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Body {
-    /// Surface nodes, then interior ones [m].
+    /// Surface nodes, then interior ones (m).
     pub nodes: Vec<DVec3>,
     /// Number of surface nodes.
     pub surface_nodes: usize,

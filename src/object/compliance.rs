@@ -12,7 +12,7 @@ use crate::memory;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Dense symmetric matrix over R covered surface nodes [m/N].
+/// Dense symmetric matrix over R covered surface nodes (m/N).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compliance {
     /// The covered surface nodes, ascending.
@@ -22,7 +22,7 @@ pub struct Compliance {
     /// Rows and columns per node: 3, or 1 where the object is isotropic and each stands for all three coordinates.
     pub rows_per_node: usize,
     /// Row-major, `rows_per_node` R numbers a row: entry (3i + a, 3j + b) is for coordinates a and b of the nodes in
-    /// places i and j, or (i, j) for each coordinate of both [m/N].
+    /// places i and j, or (i, j) for each coordinate of both (m/N).
     pub entries: Vec<f64>,
 }
 
@@ -33,7 +33,7 @@ const ABSENT: u32 = u32::MAX;
 /// columns stays in cache.
 const COLUMNS_PER_SOLVE: usize = 32;
 
-/// Most memory that the dense compliance may take, where so much is left [B]: it is what a laptop can hold beside
+/// Most memory that the dense compliance may take, where so much is left (B): it is what a laptop can hold beside
 /// everything else.
 const MAX_BYTES: usize = 4 << 30;
 
@@ -121,14 +121,14 @@ impl Compliance {
         self.rows_per_node * self.nodes.len()
     }
 
-    /// The `rows_per_node` rows of the node in place i, one after the other [m/N].
+    /// The `rows_per_node` rows of the node in place i, one after the other (m/N).
     #[must_use]
     pub fn rows(&self, i: usize) -> &[f64] {
         let length = self.rows_per_node * self.order();
         &self.entries[i * length..(i + 1) * length]
     }
 
-    /// Displacement of the node in place i per force on the node in place j [m/N].
+    /// Displacement of the node in place i per force on the node in place j (m/N).
     #[must_use]
     pub fn block(&self, i: usize, j: usize) -> DMat3 {
         let rows = self.rows(i);

@@ -18,7 +18,7 @@ use super::{
 use crate::scene::ElasticSpec;
 use glam::{DMat3, DVec3};
 
-/// Smallest volume of a tetrahedron over the cube of its longest edge [1]: for the same reason.
+/// Smallest volume of a tetrahedron over the cube of its longest edge (1): for the same reason.
 const MIN_TETRAHEDRON_ASPECT: f64 = 1e-6;
 
 impl Solid {
@@ -62,7 +62,7 @@ impl Solid {
     }
 }
 
-/// Gradients of the four shape functions [1/m].
+/// Gradients of the four shape functions (1/m).
 fn gradients([a, b, c, d]: [DVec3; 4], volume: f64) -> [DVec3; 4] {
     let six = 6.0 * volume;
     let gb = (c - a).cross(d - a) / six;

@@ -51,9 +51,9 @@ pub enum ObjectError {
     TooLarge {
         /// Surface nodes that the proxy reaches.
         nodes: usize,
-        /// Memory of the compliance [B].
+        /// Memory of the compliance (B).
         bytes: usize,
-        /// Memory that it may take [B].
+        /// Memory that it may take (B).
         limit: usize,
     },
     /// The stiffness would not fit in memory.
@@ -141,9 +141,9 @@ pub enum ObjectError {
     /// The ground holds no node at all.
     #[error("no node lies below z = {height} m, the lowest is at z = {lowest} m: raise the ground's height")]
     NothingBelow {
-        /// Height below which nodes are grounded [m].
+        /// Height below which nodes are grounded (m).
         height: f64,
-        /// Height of the lowest node [m].
+        /// Height of the lowest node (m).
         lowest: f64,
     },
     /// A connected part of the object floats.
@@ -276,7 +276,7 @@ pub enum SurfaceDefect {
     Crossing {
         /// The two triangles, ascending.
         triangles: [u32; 2],
-        /// Middle of the edge of one that meets the other [m].
+        /// Middle of the edge of one that meets the other (m).
         place: DVec3,
     },
     /// A surface that encloses nothing.

@@ -26,11 +26,11 @@ use faer::{Conj, Mat, MatMut, Par, Side};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Smallest accepted reciprocal condition number of K [1]. K (C f) equals f to about machine precision over this
+/// Smallest accepted reciprocal condition number of K (1). K (C f) equals f to about machine precision over this
 /// number, and the equilibria that are stored promise 1e-6.
 const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
 
-/// Shift, relative to the norm of K, under which the free motion of a singular K is sought [1]: the square root of
+/// Shift, relative to the norm of K, under which the free motion of a singular K is sought (1): the square root of
 /// machine precision is far above the rounding of a factorisation and far below the stiffness of any spring that
 /// counts.
 const MECHANISM_SHIFT: f64 = 1.5e-8;
@@ -112,7 +112,7 @@ impl Factor {
         }
     }
 
-    /// Solves for one vector per node in place: forces [N] become displacements [m] if the matrix is K.
+    /// Solves for one vector per node in place: forces (N) become displacements (m) if the matrix is K.
     pub fn solve(&self, vectors: &mut [DVec3]) {
         match (self.symbolic.raw(), self.symbolic.perm()) {
             (SymbolicCholeskyRaw::Supernodal(symbolic), Some(order)) => {
@@ -173,7 +173,7 @@ impl Factor {
         self.partition.is_shared()
     }
 
-    /// Memory of the factor [B].
+    /// Memory of the factor (B).
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.values)

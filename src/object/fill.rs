@@ -20,10 +20,10 @@ use std::collections::HashMap;
 const SAMPLES: i32 = 4;
 
 /// Least share of a cube that is taken as filled, so that a cube that the surface hardly enters gives the nodes on it a
-/// hold [1].
+/// hold (1).
 const LEAST_FILLED: f64 = 1.0 / 64.0;
 
-/// Stiffness of a tie in units of Young's modulus times the cubes' size [1]: a cube's own is about one of these, so
+/// Stiffness of a tie in units of Young's modulus times the cubes' size (1): a cube's own is about one of these, so
 /// that ties add one percent to what gives way under a force on one node.
 const TIE: f64 = 100.0;
 
@@ -33,7 +33,7 @@ const MAX_CUBES: f64 = 1e6;
 /// The steps from corner to corner of the six tetrahedra of a cube: the order in which the coordinates go from 0 to 1.
 const PATHS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
-/// Fills the surface with cubes of size `cell` [m]; appends the lattice's nodes to `nodes`, which are the surface's.
+/// Fills the surface with cubes of size `cell` (m); appends the lattice's nodes to `nodes`, which are the surface's.
 pub(super) fn fill(nodes: &mut Vec<DVec3>, triangles: &[[u32; 3]], cell: f64) -> Result<Solid, ObjectError> {
     let lattice = Lattice::around(nodes, cell)?;
     let places: Vec<(IVec3, DVec3)> = nodes.iter().map(|node| lattice.place(*node)).collect();

@@ -13,7 +13,7 @@ use glam::DVec3;
 /// Points of a tetrahedron along an edge, less one: (n + 1)(n + 2)(n + 3) / 6 points of equal weight.
 const ORDER: usize = 5;
 
-/// Lamé's parameters lambda and mu [Pa].
+/// Lamé's parameters lambda and mu (Pa).
 pub(super) type Lame = [f64; 2];
 
 /// Returns Lamé's parameters of Young's modulus and Poisson's ratio.

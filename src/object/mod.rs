@@ -53,7 +53,7 @@ use solid::Solid;
 /// Nodes `0..surface_nodes` lie on the surface and are the only ones that triangles name; interior nodes follow.
 #[derive(Clone, Debug)]
 pub struct Object {
-    /// Rest positions n0 of all nodes [m].
+    /// Rest positions n0 of all nodes (m).
     pub rest: Vec<DVec3>,
     /// Number S of surface nodes.
     pub surface_nodes: usize,
@@ -67,19 +67,19 @@ pub struct Object {
     pub topology: Topology,
     /// The skin of the surface, where it has one.
     pub skin: Option<Skin>,
-    /// K = Kn + Kg over all nodes, the skin's included [N/m].
+    /// K = Kn + Kg over all nodes, the skin's included (N/m).
     pub stiffness: Stiffness,
     /// Cholesky factor of K.
     pub factor: Factor,
-    /// Mass of each node [kg].
+    /// Mass of each node (kg).
     pub mass: Vec<f64>,
-    /// Damping of each node against the ground [N s/m].
+    /// Damping of each node against the ground (N s/m).
     pub damping: Vec<f64>,
     /// Repairs made on the way, one sentence each, for the user to read.
     pub warnings: Vec<String>,
 }
 
-/// Nodes [m] and triangles of a surface.
+/// Nodes (m) and triangles of a surface.
 type Shell = (Vec<DVec3>, Vec<[u32; 3]>);
 
 impl Object {
@@ -220,7 +220,7 @@ fn check_count(nodes: usize) -> Result<(), ObjectError> {
     enough.map_err(|shortage| ObjectError::Memory { nodes, shortage })
 }
 
-/// Least memory that a node takes [bytes]: nine numbers for the node and for half of the six neighbours that it has on
+/// Least memory that a node takes (bytes): nine numbers for the node and for half of the six neighbours that it has on
 /// a surface. The factor takes more, which is known once its pattern is.
 const LEAST_BYTES_PER_NODE: usize = 4 * 9 * size_of::<f64>();
 

@@ -12,7 +12,7 @@ use glam::DVec3;
 /// Parts of at most as many nodes are not cut any further: within them fill hardly depends on the order.
 const SMALLEST_PART: usize = 8;
 
-/// All nodes of `stiffness`, first to be eliminated first; `positions` of each [m].
+/// All nodes of `stiffness`, first to be eliminated first; `positions` of each (m).
 pub(super) fn nested_dissection(stiffness: &Stiffness, positions: &[DVec3]) -> Vec<u32> {
     let mut nodes: Vec<u32> = (0..positions.len() as u32).collect();
     let mut ordered = Vec::with_capacity(nodes.len());

@@ -10,7 +10,7 @@ use super::{ObjectError, Shell, SurfaceDefect, Topology, check_count, topology};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Refines a closed surface until the mean length of its edges is at most `edge` [m]. Repairs are reported in
+/// Refines a closed surface until the mean length of its edges is at most `edge` (m). Repairs are reported in
 /// `warnings`; `refuse` makes the error of a defect.
 ///
 /// # Errors
@@ -76,12 +76,12 @@ impl Mesh<'_> {
         (across, back)
     }
 
-    /// Position of the corner of triangle `t` across from its edge `k` [m].
+    /// Position of the corner of triangle `t` across from its edge `k` (m).
     fn opposite(&self, t: usize, k: usize) -> DVec3 {
         self.nodes[self.triangles[t][(k + 2) % 3] as usize]
     }
 
-    /// Returns where the node in the middle of edge `k` of triangle `t` goes [m].
+    /// Returns where the node in the middle of edge `k` of triangle `t` goes (m).
     fn midpoint(&self, t: usize, k: usize) -> DVec3 {
         let (across, back) = self.across(t, k);
         let ends = [(t, k), (across, back)];

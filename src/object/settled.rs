@@ -3,7 +3,7 @@
 use super::{Factor, FactorError, Object, Stiffening};
 use glam::DVec3;
 
-/// Last step of an equilibrium of stiffening springs over its displacement [1]: a pixel is a thousandth of a
+/// Last step of an equilibrium of stiffening springs over its displacement (1): a pixel is a thousandth of a
 /// picture.
 const SETTLED: f64 = 1e-9;
 
@@ -11,7 +11,7 @@ const SETTLED: f64 = 1e-9;
 /// error, and kappa is at most 100.
 const STEPS: usize = 5000;
 
-/// Displacements at which the springs of `object` carry `loads`, one per node [N]; springs stiffen as `stiffening`
+/// Displacements at which the springs of `object` carry `loads`, one per node (N); springs stiffen as `stiffening`
 /// says. For these the energy is lowered by steps u += K1^-1 (loads - grad W(u)), each of which cannot fail to lower
 /// it.
 ///

@@ -17,23 +17,23 @@ use std::fmt;
 /// A skin beside the mesh that carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Skin {
-    /// Membrane tension T [N/m].
+    /// Membrane tension T (N/m).
     pub tension: f64,
-    /// Bending stiffness b [N m].
+    /// Bending stiffness b (N m).
     pub bending: f64,
-    /// Foundation k [N/m^3].
+    /// Foundation k (N/m^3).
     pub foundation: f64,
-    /// Length sqrt(b / T) over which the dent of a point is rounded; none without tension or without bending [m].
+    /// Length sqrt(b / T) over which the dent of a point is rounded; none without tension or without bending (m).
     pub rounding: Option<f64>,
     /// Length over which the foundation takes up a dent: (b / k)^(1/4), or sqrt(T / k) where that is longer; none
-    /// without a foundation [m].
+    /// without a foundation (m).
     pub spreading: Option<f64>,
-    /// Mean length of the mesh's edges at rest [m].
+    /// Mean length of the mesh's edges at rest (m).
     pub mean_edge: f64,
 }
 
 impl Skin {
-    /// The skin `spec` on a surface. `nodes`: at rest [m].
+    /// The skin `spec` on a surface. `nodes`: at rest (m).
     #[must_use]
     pub fn new(spec: SkinSpec, nodes: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let SkinSpec { tension, bending, foundation } = spec;
@@ -64,14 +64,14 @@ impl fmt::Display for Skin {
 
 /// The cotangent Laplacian L of a surface and its lumped areas M.
 pub(super) struct Laplacian {
-    /// Nonzero entries of each row of L as (column, value), ascending [1].
+    /// Nonzero entries of each row of L as (column, value), ascending (1).
     rows: Vec<Vec<(u32, f64)>>,
-    /// Diagonal of M [m^2].
+    /// Diagonal of M (m^2).
     areas: Vec<f64>,
 }
 
 impl Laplacian {
-    /// Forms L and M. `nodes`: at rest [m]; `triangles`: with area.
+    /// Forms L and M. `nodes`: at rest (m); `triangles`: with area.
     pub fn new(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); nodes.len()];
         let mut areas = vec![0.0; nodes.len()];

@@ -7,17 +7,17 @@ use glam::DVec3;
 pub(super) struct Solid {
     /// Corners, in an order that makes [`volume`] positive.
     pub tetrahedra: Vec<[u32; 4]>,
-    /// Share of each that is filled with material [1].
+    /// Share of each that is filled with material (1).
     pub filled: Vec<f64>,
     /// Physical volume of each; empty if there are none.
     pub regions: Vec<u32>,
     /// Surface nodes tied to a point in a tetrahedron: node, corners, barycentric weights.
     pub ties: Vec<(u32, [u32; 4], [f64; 4])>,
-    /// Stiffness of each tie, in units of Young's modulus [m].
+    /// Stiffness of each tie, in units of Young's modulus (m).
     pub tie_length: f64,
 }
 
-/// Signed volume: a sixth of (b - a) . ((c - a) x (d - a)) [m^3].
+/// Signed volume: a sixth of (b - a) . ((c - a) x (d - a)) (m^3).
 pub(super) fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).dot((c - a).cross(d - a)) / 6.0
 }

@@ -17,13 +17,13 @@ use glam::{DMat3, DVec3};
 /// The springs of an object that stiffen.
 #[derive(Clone, Debug)]
 pub struct Stiffening {
-    /// K1 [N/m].
+    /// K1 (N/m).
     bound: Stiffness,
-    /// Force of a spring in K1 at strain one, kappa k L, for each block; zero on the diagonal [N].
+    /// Force of a spring in K1 at strain one, kappa k L, for each block; zero on the diagonal (N).
     unit_strain_force: Vec<f64>,
-    /// kappa [1].
+    /// kappa (1).
     factor: f64,
-    /// eps [1].
+    /// eps (1).
     strain: f64,
 }
 
@@ -54,26 +54,26 @@ impl Stiffening {
         Self { bound, unit_strain_force, factor, strain }
     }
 
-    /// K1, the stiffness that no strain exceeds [N/m].
+    /// K1, the stiffness that no strain exceeds (N/m).
     #[must_use]
     pub fn bound(&self) -> &Stiffness {
         &self.bound
     }
 
-    /// See the field: what the GPU's twin needs of each block [N].
+    /// See the field: what the GPU's twin needs of each block (N).
     #[must_use]
     pub fn unit_strain_force(&self) -> &[f64] {
         &self.unit_strain_force
     }
 
-    /// Adds to `force` by how much K1 u exceeds the springs' force grad W(u) [N].
+    /// Adds to `force` by how much K1 u exceeds the springs' force grad W(u) (N).
     pub fn relieve(&self, displacement: &[DVec3], force: &mut [DVec3]) {
         for (node, force) in force.iter_mut().enumerate() {
             *force += self.relief_on(node, displacement);
         }
     }
 
-    /// The same for one node [N].
+    /// The same for one node (N).
     #[must_use]
     pub fn relief_on(&self, node: usize, displacement: &[DVec3]) -> DVec3 {
         let mut relief = DVec3::ZERO;
@@ -89,7 +89,7 @@ impl Stiffening {
         relief
     }
 
-    /// Elastic energy W of the object [J].
+    /// Elastic energy W of the object (J).
     #[must_use]
     pub fn energy(&self, object: &Object, displacement: &[DVec3]) -> f64 {
         let mut energy = object.stiffness.energy(displacement);
@@ -132,7 +132,7 @@ mod tests {
         .unwrap()
     }
 
-    /// Displacements of about `size` [m], the same each time.
+    /// Displacements of about `size` (m), the same each time.
     fn field(nodes: usize, size: f64) -> Vec<DVec3> {
         let wave = |k: usize| size * (1.0 + 2.3 * k as f64).sin();
         (0..nodes).map(|i| DVec3::new(wave(3 * i), wave(3 * i + 1), wave(3 * i + 2))).collect()

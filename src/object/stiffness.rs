@@ -9,7 +9,7 @@ pub struct Stiffness {
     pub offsets: Vec<usize>,
     /// Column (node) of each block, ascending within a row.
     pub columns: Vec<u32>,
-    /// The blocks [N/m].
+    /// The blocks (N/m).
     pub blocks: Vec<DMat3>,
     /// All nodes, in the order in which a factorisation takes them.
     pub ordering: Vec<u32>,
@@ -49,7 +49,7 @@ impl Stiffness {
     }
 
     /// Factor of the identity in each block, if every block is a multiple of it: a ninth of the numbers, for products
-    /// frame after frame [N/m].
+    /// frame after frame (N/m).
     #[must_use]
     pub fn scales(&self) -> Option<Vec<f64>> {
         self.is_isotropic().then(|| self.blocks.iter().map(|block| block.x_axis.x).collect())
@@ -70,7 +70,7 @@ impl Stiffness {
         }
     }
 
-    /// `force = K displacement`: elastic force that holds the nodes displaced by `displacement` [m], [N]. Both have one
+    /// `force = K displacement`: elastic force that holds the nodes displaced by `displacement` (m), (N). Both have one
     /// entry per node.
     pub fn apply(&self, displacement: &[DVec3], force: &mut [DVec3]) {
         for (node, out) in force.iter_mut().enumerate() {
@@ -78,13 +78,13 @@ impl Stiffness {
         }
     }
 
-    /// The same for one node [N].
+    /// The same for one node (N).
     #[must_use]
     pub fn force_on(&self, node: usize, displacement: &[DVec3]) -> DVec3 {
         self.row(node).map(|(column, block)| *block * displacement[column]).sum()
     }
 
-    /// The same by the matrix's [`Stiffness::scales`] [N].
+    /// The same by the matrix's [`Stiffness::scales`] (N).
     #[must_use]
     pub fn force_by_scales(&self, scales: &[f64], node: usize, displacement: &[DVec3]) -> DVec3 {
         let range = self.offsets[node]..self.offsets[node + 1];
@@ -92,13 +92,13 @@ impl Stiffness {
         columns.zip(&scales[range]).map(|(u, scale)| u * *scale).sum()
     }
 
-    /// Energy stored at `displacement` u, 1/2 u^T K u [J].
+    /// Energy stored at `displacement` u, 1/2 u^T K u (J).
     #[must_use]
     pub fn energy(&self, displacement: &[DVec3]) -> f64 {
         0.5 * displacement.iter().enumerate().map(|(node, u)| u.dot(self.force_on(node, displacement))).sum::<f64>()
     }
 
-    /// Largest sum of absolute values in a row: a bound on the largest eigenvalue (Gershgorin) [N/m].
+    /// Largest sum of absolute values in a row: a bound on the largest eigenvalue (Gershgorin) (N/m).
     #[must_use]
     pub fn norm(&self) -> f64 {
         let row_sum = |node| self.row(node).map(|(_, block)| absolute_row_sums(block)).sum::<DVec3>().max_element();

@@ -13,7 +13,7 @@ use glam::DVec3;
 use std::{collections::HashMap, f64::consts::PI};
 
 /// Smallest height of a triangle over its longest edge, and of a closed surface's volume over its area times its extent
-/// [1]. Coordinates in single precision, as STL files and the GPU hold them, round at 6e-8 of their size: below this
+/// (1). Coordinates in single precision, as STL files and the GPU hold them, round at 6e-8 of their size: below this
 /// bound the triangle's normal would be uncertain by more than about 6 %, and its side a matter of luck.
 const MIN_TRIANGLE_ASPECT: f64 = 1e-6;
 
@@ -74,7 +74,7 @@ pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<Close
     Ok(ClosedSurface { topology, edges, components, warnings })
 }
 
-/// Mean length of the triangles' edges [m].
+/// Mean length of the triangles' edges (m).
 pub(super) fn mean_edge(nodes: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
     let ends = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
     let sum: f64 = ends.map(|ends| ends.map(|node| nodes[node as usize])).map(|[a, b]| a.distance(b)).sum();

@@ -18,24 +18,24 @@ pub struct Chain {
 pub struct Node {
     /// The joint whose link carries it.
     pub link: usize,
-    /// In the link's frame [m].
+    /// In the link's frame (m).
     pub position: DVec3,
-    /// Zero for the paper's point nodes [m].
+    /// Zero for the paper's point nodes (m).
     pub radius: f64,
-    /// Length of the link that the node stands for; zero for a node by itself [m].
+    /// Length of the link that the node stands for; zero for a node by itself (m).
     pub length: f64,
 }
 
 /// The chain placed in the world at one configuration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pose {
-    /// Origins of the link frames [m].
+    /// Origins of the link frames (m).
     pub origins: Vec<DVec3>,
     /// Rotations of the link frames: from the link's frame to the world.
     pub rotations: Vec<DMat3>,
     /// Joint axes, unit vectors in the world.
     pub axes: Vec<DVec3>,
-    /// Node positions x_i [m].
+    /// Node positions x_i (m).
     pub nodes: Vec<DVec3>,
 }
 

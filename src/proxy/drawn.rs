@@ -15,7 +15,7 @@ const DIVISIONS: usize = 8;
 /// Faces of a box, whose corner k has the upper x, y and z where bit 0, 1 and 2 of k are set.
 const FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
-/// Nodes [m] and triangles, outward.
+/// Nodes (m) and triangles, outward.
 pub type Triangles = (Vec<DVec3>, Vec<[u32; 3]>);
 
 /// Returns the surface of a shape in its link's frame; an empty one for a sphere that is none.
@@ -39,7 +39,7 @@ pub fn shape_frame(joint: Option<usize>, pose: &Pose) -> DAffine3 {
     joint.and_then(of).unwrap_or(DAffine3::from_mat3_translation(DMat3::IDENTITY, DVec3::ZERO))
 }
 
-/// Returns a box about the origin, edges [m] along the axes.
+/// Returns a box about the origin, edges (m) along the axes.
 #[must_use]
 pub fn block(size: DVec3) -> Triangles {
     let corner =
@@ -48,7 +48,7 @@ pub fn block(size: DVec3) -> Triangles {
     ((0..8).map(corner).collect(), triangles.collect())
 }
 
-/// Returns a cylinder about the origin, along z [m].
+/// Returns a cylinder about the origin, along z (m).
 #[must_use]
 pub fn cylinder(radius: f64, length: f64) -> Triangles {
     let mut nodes = vec![DVec3::Z * -0.5 * length, DVec3::Z * 0.5 * length];
@@ -65,7 +65,7 @@ pub fn cylinder(radius: f64, length: f64) -> Triangles {
     (nodes, triangles.collect())
 }
 
-/// Returns a sphere about the origin; an empty surface for a radius [m] that is none.
+/// Returns a sphere about the origin; an empty surface for a radius (m) that is none.
 #[must_use]
 pub fn sphere(radius: f64) -> Triangles {
     object::icosphere(DVec3::ZERO, radius, DIVISIONS).unwrap_or_default()

@@ -19,11 +19,11 @@ use glam::{DMat3, DVec3};
 /// M and its change at one configuration and one velocity.
 #[derive(Clone, Copy, Debug)]
 pub struct Dynamics {
-    /// M [kg m^2; kg m or kg where prismatic joints take part].
+    /// M (kg m^2; kg m or kg where prismatic joints take part).
     pub inertia: JointMatrix,
-    /// dM/dt, symmetric [kg m^2/s].
+    /// dM/dt, symmetric (kg m^2/s).
     pub inertia_rate: JointMatrix,
-    /// Skew part of the Christoffel matrix C [kg m^2/s].
+    /// Skew part of the Christoffel matrix C (kg m^2/s).
     pub coriolis: JointMatrix,
 }
 

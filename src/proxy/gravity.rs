@@ -5,8 +5,8 @@ use crate::JointVector;
 use glam::DVec3;
 
 impl Chain {
-    /// Torque with which gravity, of acceleration `gravity` [m/s^2], moves the joints at `pose`: sum over links of
-    /// m Jv^T g, Jv the Jacobian of the link's centre of mass [N m or N].
+    /// Torque with which gravity, of acceleration `gravity` (m/s^2), moves the joints at `pose`: sum over links of
+    /// m Jv^T g, Jv the Jacobian of the link's centre of mass (N m or N).
     #[must_use]
     pub fn gravity_torque(&self, pose: &Pose, gravity: DVec3) -> JointVector {
         let mut torque = JointVector::zeros(self.degrees_of_freedom());

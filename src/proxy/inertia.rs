@@ -14,7 +14,7 @@ use glam::DVec3;
 pub type JointMatrix = [[f64; MAX_JOINTS]; MAX_JOINTS];
 
 impl Chain {
-    /// Inertia M at `pose`, symmetric positive definite [kg m^2; kg m or kg where prismatic joints take part].
+    /// Inertia M at `pose`, symmetric positive definite (kg m^2; kg m or kg where prismatic joints take part).
     /// Allocates nothing.
     #[must_use]
     pub fn inertia(&self, pose: &Pose) -> JointMatrix {

@@ -8,10 +8,10 @@ use super::{Chain, Pose};
 use crate::JointVector;
 use glam::{DMat3, DVec3};
 
-/// Distance at which a position counts as reached by inverse kinematics [m]: a thousandth of an encoder step at 0.1 m.
+/// Distance at which a position counts as reached by inverse kinematics (m): a thousandth of an encoder step at 0.1 m.
 const REACHED: f64 = 1e-7;
 
-/// First damping of inverse kinematics [m]: a tenth of a link's length, so that a first step stays in the linear range.
+/// First damping of inverse kinematics (m): a tenth of a link's length, so that a first step stays in the linear range.
 const REACH_DAMPING: f64 = 0.01;
 
 /// Steps of inverse kinematics: converging ones take about ten, the rest allows for joint limits on the way.
@@ -26,7 +26,7 @@ pub fn reach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> 
 }
 
 /// Configuration near `start` at which contact node `node` is as near to `target` as the joints let it, and how near
-/// [m].
+/// (m).
 #[must_use]
 pub fn approach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) -> (JointVector, f64) {
     let mut q = *start;

@@ -9,7 +9,7 @@ use crate::scene::JointKind;
 use glam::DVec3;
 
 impl Chain {
-    /// Column `joint` of J_i of contact node `node` [m/rad, or 1 for a prismatic joint].
+    /// Column `joint` of J_i of contact node `node` (m/rad, or 1 for a prismatic joint).
     #[must_use]
     pub fn jacobian_column(&self, pose: &Pose, node: usize, joint: usize) -> DVec3 {
         if joint > self.nodes[node].link {
@@ -18,7 +18,7 @@ impl Chain {
         self.point_velocity(pose, pose.nodes[node], joint)
     }
 
-    /// Adds J_i^T `force` to `torque`, for a force [N] at contact node `node`.
+    /// Adds J_i^T `force` to `torque`, for a force (N) at contact node `node`.
     pub fn add_torque(&self, pose: &Pose, node: usize, force: DVec3, torque: &mut JointVector) {
         for (joint, torque) in torque.iter_mut().enumerate() {
             *torque += self.jacobian_column(pose, node, joint).dot(force);

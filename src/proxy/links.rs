@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 /// Link frames and joint axes in the world; the first d entries count.
 #[derive(Clone, Copy, Debug)]
 pub struct Links {
-    /// Origins o of the link frames [m].
+    /// Origins o of the link frames (m).
     pub origins: [DVec3; MAX_JOINTS],
     /// Rotations R of the link frames: from the link's frame to the world.
     pub rotations: [DMat3; MAX_JOINTS],
@@ -42,14 +42,14 @@ impl Chain {
         links
     }
 
-    /// Position of contact node `node` [m] with the chain's links at `links`.
+    /// Position of contact node `node` (m) with the chain's links at `links`.
     #[must_use]
     pub fn node_position(&self, links: &Links, node: usize) -> DVec3 {
         let node = &self.nodes[node];
         links.origins[node.link] + links.rotations[node.link] * node.position
     }
 
-    /// Columns of the Jacobian J_i of contact node `node` at `position`, as [`Chain::jacobian_column`] [m/rad or 1].
+    /// Columns of the Jacobian J_i of contact node `node` at `position`, as [`Chain::jacobian_column`] (m/rad or 1).
     #[must_use]
     pub fn node_jacobian(&self, links: &Links, node: usize, position: DVec3) -> [DVec3; MAX_JOINTS] {
         let mut columns = [DVec3::ZERO; MAX_JOINTS];

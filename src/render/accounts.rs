@@ -18,7 +18,7 @@
 use super::{coupling::Coupling, npmi::Step};
 use crate::JointVector;
 
-/// Energy balance error, relative to the energy exchanged, that is rounding [1]: each of up to a million ticks adds
+/// Energy balance error, relative to the energy exchanged, that is rounding (1): each of up to a million ticks adds
 /// some terms, rounded by eps of the sums so far: eps times the square root of their number, 1e-13, if they are
 /// random, and a thousand times that if they are not.
 pub const ACCOUNT_ROUNDING: f64 = 1e-10;
@@ -73,20 +73,20 @@ pub struct Accounts {
 /// effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extra {
-    /// Torque of the four-channel coupling's channels [N m].
+    /// Torque of the four-channel coupling's channels (N m).
     pub channels: JointVector,
-    /// Work of contact friction on the proxy [J].
+    /// Work of contact friction on the proxy (J).
     pub friction_work: f64,
-    /// Energy in the bristles after the step [J].
+    /// Energy in the bristles after the step (J).
     pub bristles: f64,
-    /// Taken by contact damping [J].
+    /// Taken by contact damping (J).
     pub contact_dissipation: f64,
-    /// Taken by the passivity controller [J].
+    /// Taken by the passivity controller (J).
     pub control_dissipation: f64,
 }
 
 impl Accounts {
-    /// Every account by its name, in the order of their balance, and what it leaves; none where it is not known [J].
+    /// Every account by its name, in the order of their balance, and what it leaves; none where it is not known (J).
     #[must_use]
     pub fn named(&self) -> [(&'static str, Option<f64>); 20] {
         [
@@ -113,7 +113,7 @@ impl Accounts {
         ]
     }
 
-    /// Returns the residual of the balance of proxy and coupling: rounding, and nothing else [J].
+    /// Returns the residual of the balance of proxy and coupling: rounding, and nothing else (J).
     #[must_use]
     pub fn residual(&self) -> f64 {
         let given = self.initial + self.absorbed() + self.stop_work;
@@ -125,21 +125,21 @@ impl Accounts {
         given - taken - self.kinetic - self.spring - self.bristles
     }
 
-    /// Returns the energy that the proxy and its coupling have taken in and not given back [J]: never less than
+    /// Returns the energy that the proxy and its coupling have taken in and not given back (J): never less than
     /// `-initial`.
     #[must_use]
     pub fn absorbed(&self) -> f64 {
         self.coupling_work + self.channel_work + self.field_work
     }
 
-    /// Energy made by sampling: what reached the coupling beyond what the device's port took in [J]. Positive while
+    /// Energy made by sampling: what reached the coupling beyond what the device's port took in (J). Positive while
     /// the held torque feeds the device; the device's own damping has to take it (Colgate's condition).
     #[must_use]
     pub fn hold_gain(&self) -> f64 {
         self.coupling_work - self.port_work
     }
 
-    /// The passivity observer of the device's port [J]: what there was at the beginning, and what came in through the
+    /// The passivity observer of the device's port (J): what there was at the beginning, and what came in through the
     /// port or went into the device's own damping since. Negative: the hand has been given energy from nowhere. `None`
     /// while it is not known what the object had stored at the beginning.
     #[must_use]
@@ -147,7 +147,7 @@ impl Accounts {
         self.first_stored.map(|stored| self.initial + stored + self.port_work + self.device_dissipation)
     }
 
-    /// The passivity observer of the object's port, turned round [J]: what the contact torque has given beyond what the
+    /// The passivity observer of the object's port, turned round (J): what the contact torque has given beyond what the
     /// object had stored. Positive: energy from nowhere. With the dataset's energy U it is the leak; without, what is
     /// more than the object can have had.
     #[must_use]
@@ -155,7 +155,7 @@ impl Accounts {
         self.first_stored.map_or(0.0, |first| self.field_work + self.stored - first)
     }
 
-    /// Returns what damping, friction, stops and controller have taken from the proxy [J].
+    /// Returns what damping, friction, stops and controller have taken from the proxy (J).
     #[must_use]
     pub fn taken_from_field(&self) -> f64 {
         self.proxy_dissipation + self.friction_dissipation + self.contact_dissipation + self.control_dissipation
@@ -175,7 +175,7 @@ impl Accounts {
         }
     }
 
-    /// Books the device's move from y_{k-1} to y_k in `elapsed` [s]: the proxy is at `proxy` x_k, the device was under
+    /// Books the device's move from y_{k-1} to y_k in `elapsed` (s): the proxy is at `proxy` x_k, the device was under
     /// `held` torque.
     pub(super) fn device_moved(
         &mut self,

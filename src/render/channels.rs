@@ -31,26 +31,26 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Channels {
     spec: FourChannelSpec,
-    /// m [kg m^2].
+    /// m (kg m^2).
     device_inertia: JointVector,
-    /// bd [N m s/rad].
+    /// bd (N m s/rad).
     device_damping: JointVector,
-    /// bv [N m s/rad].
+    /// bv (N m s/rad).
     proxy_damping: JointVector,
 }
 
 /// State of the channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChannelState {
-    /// w_{k-1} [rad/s].
+    /// w_{k-1} (rad/s).
     device_velocity: JointVector,
-    /// v_hat_{k-2} [rad/s].
+    /// v_hat_{k-2} (rad/s).
     proxy_velocity: JointVector,
-    /// wdot, filtered [rad/s^2].
+    /// wdot, filtered (rad/s^2).
     device_acceleration: JointVector,
-    /// vdot, filtered [rad/s^2].
+    /// vdot, filtered (rad/s^2).
     proxy_acceleration: JointVector,
-    /// f_h, filtered [N m].
+    /// f_h, filtered (N m).
     hand: JointVector,
 }
 
@@ -80,7 +80,7 @@ impl Channels {
     }
 
     /// Takes in that the device moved at `device` w_k and the proxy at `proxy` v_hat_{k-1} during the last `elapsed`
-    /// T_{k-1} [s], the device under `held` torque [N m].
+    /// T_{k-1} (s), the device under `held` torque (N m).
     pub fn observe(
         &self,
         state: &mut ChannelState,
@@ -106,7 +106,7 @@ impl Channels {
         state.proxy_velocity = *proxy;
     }
 
-    /// Returns what the channels add to the torque on the device under the `contact` torque tau_bar on the proxy [N m].
+    /// Returns what the channels add to the torque on the device under the `contact` torque tau_bar on the proxy (N m).
     #[must_use]
     pub fn device_torque(&self, state: &ChannelState, contact: &JointVector) -> JointVector {
         let [_, c2, _, c4] = self.spec.channels;
@@ -119,7 +119,7 @@ impl Channels {
         torque
     }
 
-    /// Returns what the channels add to the torque on the proxy, whose inertia is that of `stage` [N m].
+    /// Returns what the channels add to the torque on the proxy, whose inertia is that of `stage` (N m).
     #[must_use]
     pub fn proxy_torque(&self, state: &ChannelState, stage: &MidpointInertia) -> JointVector {
         let [c1, _, c3, _] = self.spec.channels;

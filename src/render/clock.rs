@@ -80,7 +80,7 @@ mod system {
         }
     }
 
-    /// The shortest turn that Linux grants [ns]; a tick is far shorter.
+    /// The shortest turn that Linux grants (ns); a tick is far shorter.
     const TURN: u64 = 100_000;
 
     /// Known to Linux 6.12 and newer; others refuse it, and nothing changes.

@@ -58,7 +58,7 @@ impl ContactForces {
         dataset.contacts.is_some() || dataset.refinement.is_some() && dataset.surface.is_some()
     }
 
-    /// Writes the forces at `q`, times `share`, to `forces`, one entry per node of the object [N]. Where an equilibrium
+    /// Writes the forces at `q`, times `share`, to `forces`, one entry per node of the object (N). Where an equilibrium
     /// is solved for them, this waits for it; where none is found they are zero.
     pub fn at(&self, q: &[f64], share: f64, forces: &mut [DVec3]) {
         forces.fill(DVec3::ZERO);

@@ -13,14 +13,14 @@
 use super::{accounts::Accounts, npmi::Motion};
 use crate::{JointVector, scene::HapticsSpec};
 
-/// Least energy of motion that a passivity controller brakes [J]: a gram at a micrometre a second. Below, one tick's
+/// Least energy of motion that a passivity controller brakes (J): a gram at a micrometre a second. Below, one tick's
 /// damping could not take anything that counts.
 const LEAST_MOVING_ENERGY: f64 = 1e-15;
 
 /// The controller's constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassivityControl {
-    /// m [kg m^2].
+    /// m (kg m^2).
     device_inertia: JointVector,
 }
 
@@ -32,7 +32,7 @@ impl PassivityControl {
     }
 
     /// Adds to `torque` on the device what takes the energy that its port has given from nowhere, the device moving at
-    /// `velocity` w_k, over `elapsed` T [s].
+    /// `velocity` w_k, over `elapsed` T (s).
     pub(super) fn brake_device(
         &self,
         accounts: &Accounts,
@@ -48,7 +48,7 @@ impl PassivityControl {
         }
     }
 
-    /// alpha [1/s] of the damping alpha M on the proxy for a step of `interval` T [s] from `motion`. It acts until the
+    /// alpha (1/s) of the damping alpha M on the proxy for a step of `interval` T (s) from `motion`. It acts until the
     /// object's port has the energy back, not only until as much is taken: what creates energy once does so again, and
     /// a proxy that is braked creates less (measured: a tenth).
     pub(super) fn proxy_rate(&self, accounts: &Accounts, interval: f64, motion: &Motion) -> f64 {
@@ -56,7 +56,7 @@ impl PassivityControl {
     }
 }
 
-/// alpha that takes `made` [J] within `time` T [s] from what moves with twice the energy `moving` [J]; at most 1/T.
+/// alpha that takes `made` (J) within `time` T (s) from what moves with twice the energy `moving` (J); at most 1/T.
 fn rate(made: f64, moving: f64, time: f64) -> f64 {
     if made > 0.0 && moving > LEAST_MOVING_ENERGY { (made / moving).min(1.0) / time } else { 0.0 }
 }

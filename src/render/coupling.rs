@@ -12,13 +12,13 @@ use crate::{JointVector, MAX_JOINTS, field::range::Stops, scene::HapticsSpec};
 /// The coupling's gains, one per joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
-    /// Kvc [N m/rad].
+    /// Kvc (N m/rad).
     pub stiffness: JointVector,
-    /// Bvc [N m s/rad].
+    /// Bvc (N m s/rad).
     pub damping: JointVector,
-    /// bv, between the proxy and the ground [N m s/rad].
+    /// bv, between the proxy and the ground (N m s/rad).
     pub proxy_damping: JointVector,
-    /// bd, of the device itself [N m s/rad].
+    /// bd, of the device itself (N m s/rad).
     pub device_damping: JointVector,
 }
 
@@ -35,7 +35,7 @@ impl Coupling {
     }
 
     /// Torque for the device at `position` y_k moving at `velocity` w_k, the proxy at `proxy` x_k having moved at
-    /// `proxy_velocity` v_hat_{k-1} [N m or N].
+    /// `proxy_velocity` v_hat_{k-1} (N m or N).
     #[must_use]
     pub fn device_torque(
         &self,
@@ -69,7 +69,7 @@ impl Coupling {
         Load { stiffness: self.stiffness, target: *position, damping, torque, stops }
     }
 
-    /// 1/2 Kvc |x - y|^2 [J].
+    /// 1/2 Kvc |x - y|^2 (J).
     #[must_use]
     pub fn spring_energy(&self, proxy: &JointVector, device: &JointVector) -> f64 {
         let stretch = proxy.iter().zip(device.iter()).map(|(x, y)| (x - y) * (x - y));

@@ -12,7 +12,7 @@ pub struct ForceRows {
     /// One more than there are grid points.
     offsets: Vec<usize>,
     nodes: Vec<u32>,
-    /// [N]
+    /// (N)
     forces: Vec<[f32; 3]>,
 }
 
@@ -36,7 +36,7 @@ impl ForceRows {
     }
 
     /// Calls `add` with each node that has a force at a corner of the cell around `q`: with the corner's weight times
-    /// `share`, where that is above zero, and the force there [N].
+    /// `share`, where that is above zero, and the force there (N).
     #[inline]
     pub(super) fn at(&self, q: &[f64], share: f64, mut add: impl FnMut(usize, f64, DVec3)) {
         for (point, weight) in self.lattice.locate(q).corners() {

@@ -16,18 +16,18 @@ use glam::DVec3;
 pub struct Smoothing {
     /// 1 - exp(-T/tau_s).
     share: f64,
-    /// [N]
+    /// (N)
     filtered: Vec<DVec3>,
 }
 
 impl Smoothing {
-    /// A filter of `time_constant` tau_s [s], for frames every `period` T [s] of `nodes` nodes; zero at first.
+    /// A filter of `time_constant` tau_s (s), for frames every `period` T (s) of `nodes` nodes; zero at first.
     #[must_use]
     pub fn new(time_constant: f64, period: f64, nodes: usize) -> Self {
         Self { share: -(-period / time_constant).exp_m1(), filtered: vec![DVec3::ZERO; nodes] }
     }
 
-    /// The filtered forces one frame later, `forces` having acted [N].
+    /// The filtered forces one frame later, `forces` having acted (N).
     pub fn toward(&mut self, forces: &[DVec3]) -> &[DVec3] {
         for (filtered, force) in self.filtered.iter_mut().zip(forces) {
             *filtered += self.share * (*force - *filtered);

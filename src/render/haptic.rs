@@ -31,7 +31,7 @@ use crate::{
     scene::HapticsSpec,
 };
 
-/// Energy that the loop may give the device from nowhere before its torque is brought to zero [J]: what 0.1 kg at the
+/// Energy that the loop may give the device from nowhere before its torque is brought to zero (J): what 0.1 kg at the
 /// hand has at 1.4 m/s, which a hand stops within a centimetre with 10 N.
 pub const GREATEST_GIVEN_ENERGY: f64 = 0.1;
 
@@ -56,9 +56,9 @@ pub struct Haptics {
 pub struct State {
     /// Proxy.
     motion: Motion,
-    /// v_hat of the last step [rad/s or m/s].
+    /// v_hat of the last step (rad/s or m/s).
     proxy_velocity: JointVector,
-    /// Last good device position y [rad or m].
+    /// Last good device position y (rad or m).
     device: JointVector,
     /// Torques on the device.
     held: TorqueHistory,
@@ -74,11 +74,11 @@ pub struct State {
 /// Output of a tick. All but `torque` is for recording and drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
-    /// For the device until the next tick [N m or N].
+    /// For the device until the next tick (N m or N).
     pub torque: JointVector,
-    /// Device position that was used [rad or m].
+    /// Device position that was used (rad or m).
     pub device: JointVector,
-    /// Proxy position x_k [rad or m].
+    /// Proxy position x_k (rad or m).
     pub proxy: JointVector,
     /// The contact field at x_k.
     pub sample: Sample,
@@ -174,7 +174,7 @@ impl Haptics {
         &self.field
     }
 
-    /// Nominal time between two ticks T [s].
+    /// Nominal time between two ticks T (s).
     #[must_use]
     pub fn period(&self) -> f64 {
         self.period
@@ -310,7 +310,7 @@ impl Haptics {
         torque
     }
 
-    /// One step of the proxy over `interval` [s], booked; what stopped it. The device moves at `velocity`, and contact
+    /// One step of the proxy over `interval` (s), booked; what stopped it. The device moves at `velocity`, and contact
     /// forces are `solved` at the proxy.
     fn move_proxy(
         &self,
@@ -359,7 +359,7 @@ impl Haptics {
         flags
     }
 
-    /// `wanted`, limited in size and in rate of change from `before` over `elapsed` [s].
+    /// `wanted`, limited in size and in rate of change from `before` over `elapsed` (s).
     fn limit(&self, wanted: &JointVector, before: &JointVector, elapsed: f64) -> (JointVector, Flags) {
         let (mut torque, mut flags) = (*wanted, Flags::empty());
         for (a, torque) in torque.iter_mut().enumerate() {
@@ -378,13 +378,13 @@ impl Haptics {
 }
 
 impl State {
-    /// Takes the torque that the device holds of what the last tick answered [N m or N]: accounts and channels rest on
+    /// Takes the torque that the device holds of what the last tick answered (N m or N): accounts and channels rest on
     /// it.
     pub fn hold(&mut self, torque: &JointVector) {
         self.held.correct(torque);
     }
 
-    /// Proxy position x at the next tick [rad or m].
+    /// Proxy position x at the next tick (rad or m).
     #[must_use]
     pub fn proxy(&self) -> &JointVector {
         &self.motion.position

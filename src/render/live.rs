@@ -21,11 +21,11 @@ use crate::{
 };
 use serde::Serialize;
 
-/// Ticks after which a solution is late [1]. More: the tangent is followed farther. Fewer: the store answers where the
+/// Ticks after which a solution is late (1). More: the tangent is followed farther. Fewer: the store answers where the
 /// thread that solves was held up.
 const LATE: u64 = 8;
 
-/// Farthest way of a node of the proxy, by a bound, on which a tangent is followed [m]: the second order errs by some
+/// Farthest way of a node of the proxy, by a bound, on which a tangent is followed (m): the second order errs by some
 /// percent of the force where the way is a tenth of the length over which a dent is rounded.
 const FARTHEST: f64 = 0.003;
 
@@ -33,7 +33,7 @@ const FARTHEST: f64 = 0.003;
 pub struct Live {
     /// Levels that are wanted.
     wanted: u32,
-    /// Greatest lever of each joint [m/rad or 1].
+    /// Greatest lever of each joint (m/rad or 1).
     levers: JointVector,
     whereabouts: Vec<triple_buffer::Input<Whereabouts>>,
     /// Absent unless the scene asks for them.
@@ -88,11 +88,11 @@ pub struct Answers {
     pub coarser_in_contact: u64,
     /// Ticks at which the function had changed where the proxy was.
     pub changes: u64,
-    /// Greatest change of the torque that was passed over, by joint [N m or N].
+    /// Greatest change of the torque that was passed over, by joint (N m or N).
     pub greatest_change: [f64; MAX_JOINTS],
-    /// Energy given by passing over, and taken [J].
+    /// Energy given by passing over, and taken (J).
     pub given: f64,
-    /// [J]
+    /// (J)
     pub taken: f64,
 }
 
@@ -179,7 +179,7 @@ impl Live {
     }
 
     /// Forces on the proxy's nodes in the tick whose contact was sampled last, at `x`; none where no solution is good
-    /// [N].
+    /// (N).
     pub(super) fn forces(&self, x: &JointVector) -> &[NodeForce] {
         let solution = self.solutions.as_ref().map(triple_buffer::Output::peek_output_buffer);
         match solution.filter(|solution| serves(solution, x, self.tick, &self.levers)) {
@@ -188,7 +188,7 @@ impl Live {
         }
     }
 
-    /// The contact field at `x` in a tick of `period` [s].
+    /// The contact field at `x` in a tick of `period` (s).
     pub(super) fn sample(&mut self, field: &TorqueField, x: &JointVector, accounts: &Accounts, period: f64) -> Sample {
         let Self { wanted, levers, solutions, followed, tick, last, passage, answers, .. } = self;
         let horizon = field.store().map_or(0, Store::horizon);

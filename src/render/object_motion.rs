@@ -30,11 +30,11 @@ pub struct ObjectMotion<'object> {
     /// Absent in quasi-static graphics.
     dynamics: Option<Dynamics>,
     stiffening: Option<Stiffening>,
-    /// M g of each node [N].
+    /// M g of each node (N).
     weight: Option<Vec<DVec3>>,
-    /// u [m].
+    /// u (m).
     displacement: Vec<DVec3>,
-    /// Right-hand side, then v_hat [m/s]; in quasi-static graphics u.
+    /// Right-hand side, then v_hat (m/s); in quasi-static graphics u.
     right: Vec<DVec3>,
     /// Where a frame is shared out.
     threads: Option<ThreadPool>,
@@ -47,14 +47,14 @@ const NODES_TOGETHER: usize = 1024;
 struct Dynamics {
     /// Factor of 2M/T + B + (T/2) K.
     factor: Factor,
-    /// Multiples of the identity that are the blocks of K, if it is isotropic [N/m].
+    /// Multiples of the identity that are the blocks of K, if it is isotropic (N/m).
     scales: Option<Vec<f64>>,
-    /// v [m/s].
+    /// v (m/s).
     velocity: Vec<DVec3>,
 }
 
 impl<'object> ObjectMotion<'object> {
-    /// `object` in equilibrium under no forces but its weight, where there is one, to be moved by `period` T [s] at a
+    /// `object` in equilibrium under no forces but its weight, where there is one, to be moved by `period` T (s) at a
     /// time.
     ///
     /// # Errors
@@ -86,36 +86,36 @@ impl<'object> ObjectMotion<'object> {
         Ok(Self { object, period, dynamics, stiffening, weight, displacement, right: zero, threads })
     }
 
-    /// T [s].
+    /// T (s).
     #[must_use]
     pub fn period(&self) -> f64 {
         self.period
     }
 
-    /// Node positions n = n0 + u [m].
+    /// Node positions n = n0 + u (m).
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = DVec3> {
         self.object.rest.iter().zip(&self.displacement).map(|(rest, u)| rest + u)
     }
 
-    /// Displacements u [m].
+    /// Displacements u (m).
     #[must_use]
     pub fn displacement(&self) -> &[DVec3] {
         &self.displacement
     }
 
-    /// Velocities v [m/s]; none in quasi-static graphics.
+    /// Velocities v (m/s); none in quasi-static graphics.
     #[must_use]
     pub fn velocity(&self) -> &[DVec3] {
         self.dynamics.as_ref().map_or(&[], |dynamics| &dynamics.velocity)
     }
 
-    /// Kinetic, elastic and gravitational energy [J]: what no step raises without forces.
+    /// Kinetic, elastic and gravitational energy (J): what no step raises without forces.
     #[must_use]
     pub fn energy(&self) -> f64 {
         self.energy_of(&self.displacement, self.velocity())
     }
 
-    /// The same with the nodes displaced by `displacement` [m] and moving at `velocity` [m/s].
+    /// The same with the nodes displaced by `displacement` (m) and moving at `velocity` (m/s).
     #[must_use]
     pub fn energy_of(&self, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
         let moving = self.object.mass.iter().zip(velocity);
@@ -128,7 +128,7 @@ impl<'object> ObjectMotion<'object> {
         kinetic + elastic - weight.map(|(w, u)| w.dot(*u)).sum::<f64>()
     }
 
-    /// Memory of the state and of what advances it, beside the object [B].
+    /// Memory of the state and of what advances it, beside the object (B).
     #[must_use]
     pub fn bytes(&self) -> usize {
         let weight = self.weight.as_ref().map_or(0, Vec::len);
@@ -142,7 +142,7 @@ impl<'object> ObjectMotion<'object> {
         vectors * size_of::<DVec3>() + factor + stiffening
     }
 
-    /// One frame under `forces`, one per node [N]. Returns v_hat [m/s]; in quasi-static graphics the displacements.
+    /// One frame under `forces`, one per node (N). Returns v_hat (m/s); in quasi-static graphics the displacements.
     pub fn step(&mut self, forces: &[DVec3]) -> &[DVec3] {
         match self.threads.take() {
             None => self.frame(forces, false),

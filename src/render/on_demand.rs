@@ -28,10 +28,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Blocks for which there is room beside those that are known [1]: some 0.7 GB with six joints, hours of touching.
+/// Blocks for which there is room beside those that are known (1): some 0.7 GB with six joints, hours of touching.
 const ROOM: usize = 2_000_000;
 
-/// Longest time that the levels around the first configuration may take before the loop begins [s].
+/// Longest time that the levels around the first configuration may take before the loop begins (s).
 const LONGEST_START: Duration = Duration::from_millis(1500);
 
 /// A scene that is solved while it is felt. Threads share it.
@@ -216,7 +216,7 @@ impl OnDemand {
         Ok((live, exploration))
     }
 
-    /// Greatest lever of each joint over the contact nodes [m/rad or 1].
+    /// Greatest lever of each joint over the contact nodes (m/rad or 1).
     fn levers(&self) -> JointVector {
         let ranges: Vec<[f64; 2]> =
             self.grid.axes.iter().map(|axis| [axis.start, axis.coordinate(axis.count.saturating_sub(1))]).collect();

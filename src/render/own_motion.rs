@@ -11,10 +11,10 @@ use crate::{
 };
 
 /// Torque that a motion goes up to, over the greatest of the dataset, joint by joint, or twice the device's limit where
-/// that is less [1].
+/// that is less (1).
 const LOAD: f64 = 0.5;
 
-/// Torque below which a scrape is hardly felt, in the same unit [1].
+/// Torque below which a scrape is hardly felt, in the same unit (1).
 const LEAST_LOAD: f64 = 0.05;
 
 /// Grid points of free space that a motion begins away from contact, where there are as many.
@@ -62,7 +62,7 @@ struct Along {
 struct Search<'a> {
     dataset: &'a Dataset,
     grid: &'a Grid,
-    /// Torque of load one at each joint [N m or N].
+    /// Torque of load one at each joint (N m or N).
     scale: Vec<f64>,
     /// Points in contact that are tried.
     trials: Vec<usize>,
@@ -83,7 +83,7 @@ impl<'a> Search<'a> {
         Self { dataset, grid, scale, trials }
     }
 
-    /// Returns the torque at `point` over the greatest, of the joint where that is greatest [1].
+    /// Returns the torque at `point` over the greatest, of the joint where that is greatest (1).
     fn load(&self, point: usize) -> f64 {
         let pairs = self.dataset.torque(point).iter().zip(&self.scale);
         pairs.map(|(torque, scale)| if *scale > 0.0 { torque.abs() / scale } else { 0.0 }).fold(0.0, f64::max)

@@ -13,16 +13,16 @@
 
 use crate::JointVector;
 
-/// Time in which a difference fades to 1/e [s]. Longer: the torque errs longer. Shorter: it changes faster; with this,
+/// Time in which a difference fades to 1/e (s). Longer: the torque errs longer. Shorter: it changes faster; with this,
 /// by a twentieth of the difference a millisecond.
 const TIME: f64 = 0.02;
 
 /// Rest of the differences.
 #[derive(Clone, Debug)]
 pub(super) struct Passage {
-    /// o [N m or N].
+    /// o (N m or N).
     torque: JointVector,
-    /// V at the proxy [J].
+    /// V at the proxy (J).
     energy: f64,
 }
 
@@ -32,12 +32,12 @@ impl Passage {
         Self { torque: JointVector::zeros(joints), energy: 0.0 }
     }
 
-    /// o [N m or N].
+    /// o (N m or N).
     pub fn torque(&self) -> &JointVector {
         &self.torque
     }
 
-    /// V at the proxy [J].
+    /// V at the proxy (J).
     pub fn energy(&self) -> f64 {
         self.energy
     }
@@ -56,7 +56,7 @@ impl Passage {
         }
     }
 
-    /// Fades over `period` [s], giving at most `budget` [J], nothing if that is negative. Returns what it gave;
+    /// Fades over `period` (s), giving at most `budget` (J), nothing if that is negative. Returns what it gave;
     /// negative where it took.
     pub fn fade(&mut self, period: f64, budget: f64) -> f64 {
         let mut share = 1.0 - (-period / TIME).exp();

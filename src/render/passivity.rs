@@ -19,7 +19,7 @@ use serde::Serialize;
 pub struct Bound {
     /// Name of the gain, with its joint.
     pub what: String,
-    /// Its value [N m/rad; 1 for a ratio].
+    /// Its value (N m/rad; 1 for a ratio).
     pub value: f64,
     /// Largest value that is safe, in the same unit.
     pub safe: f64,
@@ -45,37 +45,37 @@ impl std::fmt::Display for Bound {
     }
 }
 
-/// Greatest passive slope Ks of the boundary layer at `joint`, mu bv / T [N m/rad].
+/// Greatest passive slope Ks of the boundary layer at `joint`, mu bv / T (N m/rad).
 #[must_use]
 pub fn greatest_slope(spec: &HapticsSpec, joint: usize) -> f64 {
     spec.passivity_factor * spec.proxy_damping[joint] * spec.rate
 }
 
-/// Greatest passive stiffness Kvc of the coupling at `joint`, the device in nobody's hand [N m/rad].
+/// Greatest passive stiffness Kvc of the coupling at `joint`, the device in nobody's hand (N m/rad).
 #[must_use]
 pub fn greatest_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
     let encoder = if spec.encoder_step[joint] > 0.0 { encoder_bound(spec, joint) } else { f64::INFINITY };
     (wall_bound(spec, joint).min(encoder) - handed_stiffness(spec, joint)).max(0.0)
 }
 
-/// Greatest passive damping Bvc of the coupling at `joint`, the device in nobody's hand, bd - K T/2 [N m s/rad].
+/// Greatest passive damping Bvc of the coupling at `joint`, the device in nobody's hand, bd - K T/2 (N m s/rad).
 #[must_use]
 pub fn greatest_damping(spec: &HapticsSpec, joint: usize) -> f64 {
     let stiffness = spec.coupling_stiffness[joint] + handed_stiffness(spec, joint);
     (spec.device_damping[joint] - 0.5 * stiffness / spec.rate).max(0.0)
 }
 
-/// Colgate's wall, 2 (bd - Bvc) / T [N m/rad].
+/// Colgate's wall, 2 (bd - Bvc) / T (N m/rad).
 fn wall_bound(spec: &HapticsSpec, joint: usize) -> f64 {
     (2.0 * (spec.device_damping[joint] - spec.coupling_damping[joint]) * spec.rate).max(0.0)
 }
 
-/// 2 fc / Delta [N m/rad], for an encoder whose step is given.
+/// 2 fc / Delta (N m/rad), for an encoder whose step is given.
 fn encoder_bound(spec: &HapticsSpec, joint: usize) -> f64 {
     2.0 * spec.device_friction[joint] / spec.encoder_step[joint]
 }
 
-/// c2 Ks, the stiffness of the object that four channels hand to the device; none without them [N m/rad].
+/// c2 Ks, the stiffness of the object that four channels hand to the device; none without them (N m/rad).
 fn handed_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
     spec.effects.four_channel.map_or(0.0, |channels| channels.channels[1] * spec.boundary_slope[joint])
 }
@@ -115,7 +115,7 @@ fn relative_stiffness(spec: &HapticsSpec, field: &TorqueField) -> [f64; 2] {
     [object, 0.5 * spec.passivity_factor * object.hypot(layer)]
 }
 
-/// Keeps a bound that is met exactly from being exceeded by rounding [1].
+/// Keeps a bound that is met exactly from being exceeded by rounding (1).
 const ROUNDING: f64 = 1e-12;
 
 /// Returns what is wrong with the gains of `spec` in one sentence, and the values that would be passive in another;
@@ -198,7 +198,7 @@ fn to_digits(value: f64, round: fn(f64) -> f64) -> f64 {
     if shift >= 0 { round(value * power) / power } else { round(value / power) * power }
 }
 
-/// Keeps an advised gain from being beyond its bound by the rounding of the sums on both sides [1]: much more than
+/// Keeps an advised gain from being beyond its bound by the rounding of the sums on both sides (1): much more than
 /// some eps, much less than its digits.
 const ADVICE_ROUNDING: f64 = 1e-9;
 

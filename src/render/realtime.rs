@@ -40,7 +40,7 @@ const RECORDER_PERIOD: Duration = Duration::from_millis(5);
 /// How often the graphics thread looks for the first tick.
 const FIRST_TICK_PERIOD: Duration = Duration::from_millis(1);
 
-/// Relative difference of two rates of which one is the inverse of a period that is the inverse of the other [1]: each
+/// Relative difference of two rates of which one is the inverse of a period that is the inverse of the other (1): each
 /// division rounds once.
 const SAME_RATE: f64 = 2.0 * f64::EPSILON;
 

@@ -30,9 +30,9 @@ use std::{
 /// All that a session needs to be had again.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Position at which the proxy was put [rad or m].
+    /// Position at which the proxy was put (rad or m).
     start: JointVector,
-    /// When the frames that were kept were drawn [s].
+    /// When the frames that were kept were drawn (s).
     kept: Vec<f64>,
     rows: Vec<Row>,
 }
@@ -82,7 +82,7 @@ pub enum RecordingError {
     },
 }
 
-/// Largest file that is read [bytes]: two hours of six joints at 1 kHz.
+/// Largest file that is read (bytes): two hours of six joints at 1 kHz.
 const GREATEST_FILE: u64 = 4 << 30;
 
 /// Most frames of a tick: those of a second at the highest rate. A loop that rests longer has long missed its

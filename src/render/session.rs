@@ -21,7 +21,7 @@ pub struct Plan {
     pub joints: Vec<JointLabel>,
     /// Number of ticks.
     pub ticks: usize,
-    /// Instants [s], ascending, of which the first frame at or after is kept.
+    /// Instants (s), ascending, of which the first frame at or after is kept.
     pub snapshots: Vec<f64>,
 }
 
@@ -41,9 +41,9 @@ pub enum SessionError {
          {scene} Hz: set rate = {device} in [haptics] of the scene, and bake it again"
     )]
     Rate {
-        /// The device's [Hz].
+        /// The device's (Hz).
         device: f64,
-        /// The scene's [Hz].
+        /// The scene's (Hz).
         scene: f64,
     },
     /// The object cannot be drawn.
@@ -60,11 +60,11 @@ pub enum SessionError {
 /// The part of a tick that graphics needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Latest {
-    /// Time of the tick [s]; negative before the first.
+    /// Time of the tick (s); negative before the first.
     pub time: f64,
-    /// Proxy x [rad or m].
+    /// Proxy x (rad or m).
     pub proxy: JointVector,
-    /// Device y [rad or m].
+    /// Device y (rad or m).
     pub device: JointVector,
     /// Factor on the dataset's contact forces; zero out of contact.
     pub share: f64,
@@ -83,7 +83,7 @@ pub struct Driver<'session> {
 }
 
 impl Plan {
-    /// A session of `seconds` with a tick every `period` [s], and `snapshots` instants spread evenly over it.
+    /// A session of `seconds` with a tick every `period` (s), and `snapshots` instants spread evenly over it.
     #[must_use]
     pub fn new(joints: Vec<JointLabel>, period: f64, seconds: f64, snapshots: usize) -> Self {
         Self {
@@ -128,7 +128,7 @@ impl<'session> Driver<'session> {
         self.restart = true;
     }
 
-    /// Returns where the device was when the session began [rad or m].
+    /// Returns where the device was when the session began (rad or m).
     #[must_use]
     pub fn start(&self) -> &JointVector {
         &self.start
@@ -139,7 +139,7 @@ impl<'session> Driver<'session> {
         self.device.apply(&JointVector::zeros(self.haptics.joints()));
     }
 
-    /// One tick, `elapsed` after the one before and `interval` before the next [s]: read, compute, apply. Answers with
+    /// One tick, `elapsed` after the one before and `interval` before the next (s): read, compute, apply. Answers with
     /// the record and what graphics needs of it. Never allocates.
     pub fn tick(&mut self, elapsed: f64, interval: f64) -> (Tick, Latest) {
         // The first tick follows the reading in `new` at once.
@@ -189,7 +189,7 @@ pub(super) struct Frames<'session, 'object> {
     graphics: &'session mut Graphics<'object>,
     snapshots: std::iter::Peekable<std::vec::IntoIter<f64>>,
     kept: Vec<Frame>,
-    /// Time of the tick that each frame showed [s].
+    /// Time of the tick that each frame showed (s).
     shown: Vec<f64>,
 }
 
@@ -199,7 +199,7 @@ impl<'session, 'object> Frames<'session, 'object> {
         Self { graphics, snapshots, kept: Vec::with_capacity(plan.snapshots.len()), shown: Vec::new() }
     }
 
-    /// When the next frame is due [s].
+    /// When the next frame is due (s).
     pub(super) fn due(&self) -> f64 {
         self.shown.len() as f64 * self.graphics.motion().period()
     }

@@ -33,7 +33,7 @@ pub struct Steal {
     pub late: u64,
     /// Those of them beside which the hypervisor took their processor.
     pub late_beside_steal: u64,
-    /// Time that it took from all processors during the session [s].
+    /// Time that it took from all processors during the session (s).
     pub seconds: f64,
 }
 

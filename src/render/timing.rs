@@ -5,7 +5,7 @@ use hdrhistogram::Histogram;
 use serde::Serialize;
 use std::time::Duration;
 
-/// Longest time that is resolved [ns]: ten seconds; longer ones count as this.
+/// Longest time that is resolved (ns): ten seconds; longer ones count as this.
 const GREATEST: u64 = 10_000_000_000;
 
 /// Decimal digits kept of each time.
@@ -15,7 +15,7 @@ const DIGITS: u8 = 3;
 #[derive(Clone, Debug)]
 pub struct Durations(Histogram<u64>);
 
-/// Durations at given shares of all [us].
+/// Durations at given shares of all (us).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Percentiles {
     /// Number of durations.
@@ -35,9 +35,9 @@ pub struct Percentiles {
 /// Number of durations within an interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bin {
-    /// Lower end [us]; included.
+    /// Lower end (us); included.
     pub from: f64,
-    /// Upper end [us]; not included, but for the rounding of the histogram's own bins.
+    /// Upper end (us); not included, but for the rounding of the histogram's own bins.
     pub to: f64,
     /// How many.
     pub count: u64,
@@ -86,7 +86,7 @@ impl Durations {
     pub fn bins(&self) -> Vec<Bin> {
         /// Ratio of a bin's ends.
         const RATIO: f64 = 1.258_925_411_794_167_2;
-        /// Upper end of the first bin [ns]: clocks resolve little less.
+        /// Upper end of the first bin (ns): clocks resolve little less.
         const FIRST: u64 = 100;
         if self.0.is_empty() {
             return Vec::new();

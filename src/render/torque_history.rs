@@ -7,17 +7,17 @@ use crate::JointVector;
 /// The last torques on the device, in a ring as long as a position may be old.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TorqueHistory {
-    /// On the device [N m or N].
+    /// On the device (N m or N).
     torques: Vec<JointVector>,
     last: usize,
-    /// Last torque that the loop asked for [N m or N].
+    /// Last torque that the loop asked for (N m or N).
     asked: JointVector,
-    /// Nominal T [s].
+    /// Nominal T (s).
     period: f64,
 }
 
 impl TorqueHistory {
-    /// No torque on `joints` joints, with a tick every `period` [s].
+    /// No torque on `joints` joints, with a tick every `period` (s).
     pub fn new(joints: usize, period: f64) -> Self {
         let ticks = (GREATEST_POSITION_AGE / period).ceil() as usize + 1;
         let zero = JointVector::zeros(joints);
@@ -29,7 +29,7 @@ impl TorqueHistory {
         &self.asked
     }
 
-    /// `age` [s] ago, to a tick, or as long ago as is remembered.
+    /// `age` (s) ago, to a tick, or as long ago as is remembered.
     pub fn before(&self, age: f64) -> &JointVector {
         let count = self.torques.len();
         let ticks = ((age / self.period).round().max(0.0) as usize).min(count - 1);

@@ -17,23 +17,23 @@ use std::io::{self, Write};
 /// One tick of the haptic loop, at its beginning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
-    /// Since the start [s].
+    /// Since the start (s).
     pub time: f64,
     /// Input of the loop, unchanged.
     pub inputs: Inputs,
     /// Whether a fault was cleared before the tick.
     pub restart: bool,
-    /// Where the hand wants the device; the device's own position where no hand is simulated [rad or m].
+    /// Where the hand wants the device; the device's own position where no hand is simulated (rad or m).
     pub hand: JointVector,
-    /// Device position y [rad or m].
+    /// Device position y (rad or m).
     pub device: JointVector,
-    /// Proxy position x [rad or m].
+    /// Proxy position x (rad or m).
     pub proxy: JointVector,
-    /// Torque commanded to the device [N m or N].
+    /// Torque commanded to the device (N m or N).
     pub device_torque: JointVector,
     /// Part of it that the device applied, and why not all.
     pub applied: Applied,
-    /// Contact torque tau_bar on the proxy, after the boundary layer [N m or N].
+    /// Contact torque tau_bar on the proxy, after the boundary layer (N m or N).
     pub contact_torque: JointVector,
     /// Interpolated contact index, 0 to 1.
     pub index: f64,
@@ -52,11 +52,11 @@ pub struct Tick {
 /// The object at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
-    /// [s]
+    /// (s)
     pub time: f64,
-    /// Proxy position whose contact forces deform the object [rad or m].
+    /// Proxy position whose contact forces deform the object (rad or m).
     pub proxy: JointVector,
-    /// Positions n of the object's nodes, surface nodes first [m].
+    /// Positions n of the object's nodes, surface nodes first (m).
     pub nodes: Vec<DVec3>,
 }
 
@@ -65,13 +65,13 @@ pub struct Frame {
 pub struct Trace {
     /// One per joint.
     pub joints: Vec<JointLabel>,
-    /// Position at which the proxy was put [rad or m].
+    /// Position at which the proxy was put (rad or m).
     pub start: JointVector,
     /// Ascending in time.
     pub ticks: Vec<Tick>,
     /// Ascending in time; empty without graphics.
     pub frames: Vec<Frame>,
-    /// Time of the tick that each frame showed, kept or not [s]; ascending.
+    /// Time of the tick that each frame showed, kept or not (s); ascending.
     pub shown: Vec<f64>,
 }
 
@@ -81,40 +81,40 @@ pub struct Trace {
 pub struct Summary {
     /// Ticks recorded.
     pub ticks: usize,
-    /// Duration [s].
+    /// Duration (s).
     pub seconds: f64,
     /// Share of ticks in contact, 0 to 1.
     pub contact_share: f64,
     /// Most object nodes in contact at once.
     pub max_contact_nodes: u32,
-    /// Largest contact torque, over the joints that turn [N m].
+    /// Largest contact torque, over the joints that turn (N m).
     pub max_contact_torque: f64,
-    /// Largest contact force, over the joints that slide [N].
+    /// Largest contact force, over the joints that slide (N).
     pub max_contact_force: f64,
-    /// Largest change of the contact torque from tick to tick, per millisecond [N m/ms].
+    /// Largest change of the contact torque from tick to tick, per millisecond (N m/ms).
     pub max_contact_torque_step: f64,
-    /// Largest change of the contact force from tick to tick, per millisecond [N/ms].
+    /// Largest change of the contact force from tick to tick, per millisecond (N/ms).
     pub max_contact_force_step: f64,
-    /// Largest torque on the device, over the joints that turn [N m].
+    /// Largest torque on the device, over the joints that turn (N m).
     pub max_device_torque: f64,
-    /// Largest force on the device, over the joints that slide [N].
+    /// Largest force on the device, over the joints that slide (N).
     pub max_device_force: f64,
-    /// Largest change of the torque on the device from tick to tick, per millisecond [N m/ms].
+    /// Largest change of the torque on the device from tick to tick, per millisecond (N m/ms).
     pub max_device_torque_step: f64,
-    /// Largest change of the force on the device from tick to tick, per millisecond [N/ms].
+    /// Largest change of the force on the device from tick to tick, per millisecond (N/ms).
     pub max_device_force_step: f64,
-    /// Largest residual of the energy accounts [J].
+    /// Largest residual of the energy accounts (J).
     pub max_account_residual: f64,
-    /// The same over the energy that the whole session exchanged [1].
+    /// The same over the energy that the whole session exchanged (1).
     pub max_relative_account_residual: f64,
-    /// Least that proxy and coupling had absorbed at any tick [J]: not below zero but for rounding.
+    /// Least that proxy and coupling had absorbed at any tick (J): not below zero but for rounding.
     pub min_absorbed: f64,
     /// Energy that the contact torque gave beyond what was stored, by time step and interpolation, up to the last tick
-    /// [J].
+    /// (J).
     pub leak: f64,
-    /// Energy made by holding the device's torque between ticks, at the last tick [J].
+    /// Energy made by holding the device's torque between ticks, at the last tick (J).
     pub hold_gain: f64,
-    /// Energy that the device's port took in, at the last tick [J].
+    /// Energy that the device's port took in, at the last tick (J).
     pub port_work: f64,
     /// Ticks with the proxy outside the grid, in space that is known to be free.
     pub outside: usize,
@@ -183,7 +183,7 @@ impl Trace {
         s
     }
 
-    /// Norms of `effort` over the joints that turn [N m], and over those that slide [N].
+    /// Norms of `effort` over the joints that turn (N m), and over those that slide (N).
     fn sizes(&self, effort: &JointVector) -> [f64; 2] {
         let mut squares = [0.0; 2];
         for (effort, joint) in effort.iter().zip(&self.joints) {

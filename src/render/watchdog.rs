@@ -18,33 +18,33 @@
 use super::{flags::Fault, inputs::Inputs};
 use crate::{JointVector, input::GREATEST_INPUT, scene::GREATEST_INTERVAL};
 
-/// Greatest age of a device's position on which a torque may rest [s]: ten ticks at 1 kHz. A hand, which moves at below
+/// Greatest age of a device's position on which a torque may rest (s): ten ticks at 1 kHz. A hand, which moves at below
 /// 10 Hz, has gone on by no more than half a radian of its phase.
 pub const GREATEST_POSITION_AGE: f64 = 0.01;
 
-/// Least time between two ticks [s]: a device's encoder steps, of 1e-5 rad or so, divided by less would give velocities
+/// Least time between two ticks (s): a device's encoder steps, of 1e-5 rad or so, divided by less would give velocities
 /// of tens of rad/s to a device at rest.
 const LEAST_INTERVAL: f64 = 1e-6;
 
-/// Time over which the mean time between ticks is taken [s]: two of [`GREATEST_INTERVAL`], so that one such pause
+/// Time over which the mean time between ticks is taken (s): two of [`GREATEST_INTERVAL`], so that one such pause
 /// lengthens the mean by half only, while persistent overruns are found within a second.
 const PACE_WINDOW: f64 = 2.0 * GREATEST_INTERVAL;
 
 /// Limits of the inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Watchdog {
-    /// T [s].
+    /// T (s).
     period: f64,
-    /// Greatest speed of each joint that is taken for motion [rad/s or m/s].
+    /// Greatest speed of each joint that is taken for motion (rad/s or m/s).
     speed_limit: JointVector,
 }
 
-/// How the ticks have come lately: their number n, older ones weighing less [1].
+/// How the ticks have come lately: their number n, older ones weighing less (1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TickRate(f64);
 
 impl TickRate {
-    /// Mean time between ticks [s].
+    /// Mean time between ticks (s).
     #[must_use]
     pub fn mean(self) -> f64 {
         PACE_WINDOW / (self.0 - 1.0)
@@ -52,7 +52,7 @@ impl TickRate {
 }
 
 impl Watchdog {
-    /// A watchdog for ticks every `period` [s] and joints no faster than `speed_limit` [rad/s or m/s].
+    /// A watchdog for ticks every `period` (s) and joints no faster than `speed_limit` (rad/s or m/s).
     #[must_use]
     pub fn new(period: f64, speed_limit: JointVector) -> Self {
         Self { period, speed_limit }
@@ -82,7 +82,7 @@ impl Watchdog {
         TickRate(PACE_WINDOW / self.period + 1.0)
     }
 
-    /// Takes in that `elapsed` [s], which can lie between two ticks, lay before this one.
+    /// Takes in that `elapsed` (s), which can lie between two ticks, lay before this one.
     ///
     /// # Errors
     /// When deadlines are missed persistently.
@@ -91,7 +91,7 @@ impl Watchdog {
         if pace.mean() > self.greatest_mean() { Err(Fault::Overrun) } else { Ok(()) }
     }
 
-    /// Longest mean time between ticks that may persist [s].
+    /// Longest mean time between ticks that may persist (s).
     #[must_use]
     pub fn greatest_mean(&self) -> f64 {
         GREATEST_POSITION_AGE.max(2.0 * self.period)
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// Time until persistent overruns are found, and the mean then [s]; none within a minute.
+    /// Time until persistent overruns are found, and the mean then (s); none within a minute.
     fn found(period: f64, time: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
         let watchdog = Watchdog::new(period, JointVector::zeros(1));
         let (mut pace, mut passed, mut k) = (watchdog.start(), 0.0, 0);

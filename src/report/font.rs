@@ -79,7 +79,7 @@ pub(super) fn outline(text: &str, size: f64, weight: Weight) -> Option<tiny_skia
 struct Pen {
     path: PathBuilder,
     scale: f32,
-    /// Origin of the glyph [units of the font].
+    /// Origin of the glyph (units of the font).
     x: f32,
 }
 

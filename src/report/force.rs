@@ -20,7 +20,7 @@ use glam::{DMat3, DVec3};
 /// force would be uncertain by a hundred times the torque's error.
 const REGULAR_JACOBIAN: f64 = 1e-2;
 
-/// Force at the chain's last contact node that has the joint torques `torque` at `q` [N]; `None` where the chain has
+/// Force at the chain's last contact node that has the joint torques `torque` at `q` (N); `None` where the chain has
 /// not three joints, or is singular there.
 #[must_use]
 pub fn end_force(chain: &Chain, q: &JointVector, torque: &JointVector) -> Option<DVec3> {
@@ -40,9 +40,9 @@ pub fn end_force(chain: &Chain, q: &JointVector, torque: &JointVector) -> Option
 pub struct EndForce {
     /// Name of the dataset, for the legend.
     pub name: String,
-    /// Time [s] and force [N]; no numbers where the arm is singular.
+    /// Time (s) and force (N); no numbers where the arm is singular.
     pub forces: Vec<(f64, DVec3)>,
-    /// First and last moment of the longest contact [s].
+    /// First and last moment of the longest contact (s).
     pub contact: Option<[f64; 2]>,
 }
 
@@ -51,9 +51,9 @@ pub struct EndForce {
 pub struct SteadyForce {
     /// `x`, `y` or `z`.
     pub axis: char,
-    /// Mean [N].
+    /// Mean (N).
     pub mean: f64,
-    /// Greatest departure from the mean, as a fraction of it [1].
+    /// Greatest departure from the mean, as a fraction of it (1).
     pub variation: f64,
 }
 

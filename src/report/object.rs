@@ -25,11 +25,11 @@ use rayon::prelude::*;
 
 /// The object and the proxy at one instant.
 pub struct Instant {
-    /// [s]
+    /// (s)
     pub time: f64,
-    /// Positions n of the surface nodes [m].
+    /// Positions n of the surface nodes (m).
     pub nodes: Vec<DVec3>,
-    /// Contact forces on them [N].
+    /// Contact forces on them (N).
     pub forces: Vec<NodeForce>,
     /// Object nodes in contact at the nearest grid point in contact (the recording's number; `forces`, interpolated
     /// between grid points, act on more).
@@ -162,9 +162,9 @@ struct Scene<'a> {
     triangles: &'a [[u32; 3]],
     camera: Camera,
     map: ColourMap,
-    /// Half the diagonal of the object at rest [m].
+    /// Half the diagonal of the object at rest (m).
     radius: f64,
-    /// Longest arrow's force [N].
+    /// Longest arrow's force (N).
     greatest_force: f64,
 }
 

@@ -20,11 +20,11 @@ pub struct Prediction {
     pub samples: usize,
     /// Number of these that the dataset predicts.
     pub predicted: usize,
-    /// Root mean square of predicted less measured torque, a joint each [N m or N].
+    /// Root mean square of predicted less measured torque, a joint each (N m or N).
     pub rms: Vec<f64>,
-    /// Greatest of these in size, a joint each [N m or N].
+    /// Greatest of these in size, a joint each (N m or N).
     pub worst: Vec<f64>,
-    /// Root mean square of the samples' own standard deviations, a joint each, where they were measured [N m or N].
+    /// Root mean square of the samples' own standard deviations, a joint each, where they were measured (N m or N).
     pub deviation: Option<Vec<f64>>,
 }
 

@@ -129,7 +129,7 @@ fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick
     Curve { name: name.to_owned(), colour, dashed: false, points }
 }
 
-/// Begin and end of each uninterrupted contact [s].
+/// Begin and end of each uninterrupted contact (s).
 pub(super) fn contact_intervals(ticks: &[Tick]) -> Vec<[f64; 2]> {
     ticks
         .chunk_by(|a, b| a.contact == b.contact)

@@ -43,7 +43,7 @@ pub fn slices(dataset: &Dataset) -> Canvas {
     canvas
 }
 
-/// Least range of a colour map over the greatest torque of any joint of the same unit [1]: noise of a hundredth of what
+/// Least range of a colour map over the greatest torque of any joint of the same unit (1): noise of a hundredth of what
 /// is felt stays pale.
 const LEAST_SHARE: f64 = 0.05;
 
@@ -65,7 +65,7 @@ struct Slice {
 struct Tally {
     points: usize,
     contacts: usize,
-    /// Sum of the torques' sizes [N m].
+    /// Sum of the torques' sizes (N m).
     torque: f64,
 }
 
@@ -278,7 +278,7 @@ pub fn torque_size_label(dataset: &Dataset) -> String {
     }
 }
 
-/// Size of the torque at a grid point: of the revolute joints where there are both kinds [N m], else of all.
+/// Size of the torque at a grid point: of the revolute joints where there are both kinds (N m), else of all.
 #[must_use]
 pub fn torque_size(dataset: &Dataset, point: usize) -> f64 {
     let mixed = is_mixed(dataset);

@@ -3,12 +3,12 @@
 use super::RosError;
 use std::{borrow::Cow, io::Read, path::Path};
 
-/// Longest record or chunk that is read [bytes]: a chunk of a recorder's is a few MiB.
+/// Longest record or chunk that is read (bytes): a chunk of a recorder's is a few MiB.
 pub(super) const LONGEST_RECORD: u64 = 1 << 26;
 
 /// A chunk as the file holds it.
 pub(super) struct Chunk<'a> {
-    /// Length of its records [bytes].
+    /// Length of its records (bytes).
     pub size: u64,
     /// CRC-32 of its records; 0 for none.
     pub checksum: u32,

@@ -12,7 +12,7 @@ const MOST_SAMPLES: usize = 3_600_000;
 pub struct Course {
     /// Topic that they come from.
     pub topic: String,
-    /// Time since the first message [s], which ascends, and positions [rad or m].
+    /// Time since the first message (s), which ascends, and positions (rad or m).
     pub samples: Vec<(f64, JointVector)>,
     /// Messages that were left out: they lack one of the joints, or come no later than the one before.
     pub left_out: u64,

@@ -22,17 +22,17 @@ uint32 nanosec
 /// State of some joints at an instant. Each of the three lists is empty or has one number for each name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointState {
-    /// Time stamp [ns].
+    /// Time stamp (ns).
     pub stamp: u64,
     /// Frame; most publishers leave it empty.
     pub frame: String,
     /// Names of the joints.
     pub names: Vec<String>,
-    /// [rad or m]
+    /// (rad or m)
     pub position: Vec<f64>,
-    /// [rad/s or m/s]
+    /// (rad/s or m/s)
     pub velocity: Vec<f64>,
-    /// [N m or N]
+    /// (N m or N)
     pub effort: Vec<f64>,
 }
 

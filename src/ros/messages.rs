@@ -22,7 +22,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The messages: topic, log time [ns], bytes.
+/// The messages: topic, log time (ns), bytes.
 pub(super) struct Messages {
     pub path: PathBuf,
     file: BufReader<File>,
@@ -34,7 +34,7 @@ pub(super) struct Messages {
     over: bool,
 }
 
-/// A message: topic, log time [ns], bytes.
+/// A message: topic, log time (ns), bytes.
 type Logged = (String, u64, Vec<u8>);
 
 /// Topics that the records so far have declared.

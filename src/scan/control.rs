@@ -15,7 +15,7 @@ const SPEED_TICKS: usize = 5;
 pub struct PdControl {
     stiffness: JointVector,
     damping: JointVector,
-    /// Greatest speed of the commanded position [rad/s or m/s].
+    /// Greatest speed of the commanded position (rad/s or m/s).
     speed: f64,
     commanded: JointVector,
     commanded_speed: JointVector,
@@ -26,9 +26,9 @@ pub struct PdControl {
 /// Output of the controller at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PdOutput {
-    /// Control torque without gravity [N m].
+    /// Control torque without gravity (N m).
     pub torque: JointVector,
-    /// Measured speed [rad/s or m/s].
+    /// Measured speed (rad/s or m/s).
     pub speed: JointVector,
 }
 
@@ -41,13 +41,13 @@ impl PdControl {
         Self { stiffness, damping, speed, commanded: position, commanded_speed: zero, history }
     }
 
-    /// Commanded position [rad or m].
+    /// Commanded position (rad or m).
     #[must_use]
     pub fn commanded(&self) -> &JointVector {
         &self.commanded
     }
 
-    /// Moves the commanded position towards `target` for one `period` [s]; true when it is there. All joints arrive at
+    /// Moves the commanded position towards `target` for one `period` (s); true when it is there. All joints arrive at
     /// the same time.
     pub fn advance(&mut self, target: &JointVector, period: f64) -> bool {
         let mut way = *target;
@@ -73,7 +73,7 @@ impl PdControl {
         self.rest();
     }
 
-    /// Torque for the measured `position`, read every `period` [s].
+    /// Torque for the measured `position`, read every `period` (s).
     pub fn torque(&mut self, position: &JointVector, period: f64) -> PdOutput {
         if self.history.len() > SPEED_TICKS {
             self.history.pop_front();

@@ -53,13 +53,13 @@ impl RowStatus {
 pub struct ScanRow {
     /// Number in the plan.
     pub point: usize,
-    /// Since the rig was started [s].
+    /// Since the rig was started (s).
     pub time: f64,
-    /// Measured configuration, averaged [rad or m].
+    /// Measured configuration, averaged (rad or m).
     pub q: JointVector,
-    /// Contact torque on the proxy, averaged [N m or N].
+    /// Contact torque on the proxy, averaged (N m or N).
     pub torque: JointVector,
-    /// Standard deviation of the torque of a single tick [N m or N].
+    /// Standard deviation of the torque of a single tick (N m or N).
     pub deviation: JointVector,
     /// Ticks averaged.
     pub ticks: u32,
@@ -224,7 +224,7 @@ fn write_row(row: &ScanRow, out: impl Write) -> io::Result<()> {
     table.field(row.ticks)?.field(row.status.name())?.end()
 }
 
-/// Length of the file up to its last line end [bytes].
+/// Length of the file up to its last line end (bytes).
 fn whole_lines(file: &mut File) -> io::Result<u64> {
     let length = file.seek(SeekFrom::End(0))?;
     let tail = length.min(LONGEST_LINE);

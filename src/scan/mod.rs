@@ -33,10 +33,10 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-/// Acceleration of gravity [m/s^2], standard value.
+/// Acceleration of gravity (m/s^2), standard value.
 pub const GRAVITY: f64 = 9.806_65;
 
-/// Time for which a device is braked after a limit [s]: several time constants of damping against inertia.
+/// Time for which a device is braked after a limit (s): several time constants of damping against inertia.
 const BRAKE_TIME: f64 = 0.3;
 
 /// A scan failed or was stopped.
@@ -75,7 +75,7 @@ pub struct ScanProgress {
     pub done: usize,
     /// Points of the plan that can be reached.
     pub points: usize,
-    /// Time on the rig's clock [s].
+    /// Time on the rig's clock (s).
     pub time: f64,
 }
 
@@ -92,7 +92,7 @@ pub struct ScanReport {
     pub limited: usize,
     /// Points that the joints do not reach.
     pub unreachable: usize,
-    /// Time on the rig's clock in this run [s].
+    /// Time on the rig's clock in this run (s).
     pub seconds: f64,
     /// True when every point that can be reached was logged, or a hand led for the time that was asked for.
     pub whole: bool,

@@ -19,7 +19,7 @@ const SCAN_POINTS: usize = 1_000_000;
 /// One stop of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// Commanded configuration [rad or m].
+    /// Commanded configuration (rad or m).
     pub q: JointVector,
     /// Number of the plan's point, in the order of the specification; `None` for a way point at which nothing is
     /// measured.

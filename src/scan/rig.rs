@@ -5,7 +5,7 @@ use crate::JointVector;
 /// A device that can be driven, with the object it touches. A real one waits for its clock in [`Rig::hold`], a
 /// simulated one moves on.
 pub trait Rig {
-    /// Holds `torque` for `period` [s], then reads the joints.
+    /// Holds `torque` for `period` (s), then reads the joints.
     ///
     /// # Errors
     /// When the device does not answer or refuses; the scan then stops.
@@ -21,9 +21,9 @@ pub trait Rig {
 /// Measurement of a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigReading {
-    /// Time since the rig was started [s].
+    /// Time since the rig was started (s).
     pub time: f64,
-    /// Measured joint positions [rad or m].
+    /// Measured joint positions (rad or m).
     pub position: JointVector,
     /// Whether a hand holds the device: a button on its handle, as haptic devices have one. What is read meanwhile is
     /// not the object's torque alone. Always false where there is no such button.

@@ -17,8 +17,8 @@ pub struct Steadiness {
 }
 
 impl Steadiness {
-    /// A window of `ticks` (at least two), with the range `still` of a position [rad or m] and the change `drift` of a
-    /// mean torque [N m].
+    /// A window of `ticks` (at least two), with the range `still` of a position (rad or m) and the change `drift` of a
+    /// mean torque (N m).
     #[must_use]
     pub fn new(ticks: usize, still: f64, drift: f64) -> Self {
         let ticks = ticks.max(2);

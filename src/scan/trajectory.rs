@@ -20,12 +20,12 @@ use std::{
 /// Positions at times, joined by straight lines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
-    /// Time [s] and configuration [rad or m], ascending in time.
+    /// Time (s) and configuration (rad or m), ascending in time.
     pub rows: Vec<(f64, JointVector)>,
 }
 
 impl Trajectory {
-    /// Returns the trajectory through `plan` at `speed` [rad/s or m/s], resting for `dwell` [s] at each point.
+    /// Returns the trajectory through `plan` at `speed` (rad/s or m/s), resting for `dwell` (s) at each point.
     #[must_use]
     pub fn new(plan: &Plan, speed: f64, dwell: f64) -> Self {
         let mut rows: Vec<(f64, JointVector)> = Vec::new();
@@ -44,7 +44,7 @@ impl Trajectory {
         Self { rows }
     }
 
-    /// Returns its duration [s].
+    /// Returns its duration (s).
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.rows.last().map_or(0.0, |(time, _)| *time)

@@ -9,15 +9,15 @@ pub struct DeviceSpec {
     /// Rows of A in `q = A m + b`, m the device's coordinates, q the scene's joints or, for a Cartesian device, the
     /// position of its tip; `None` for the identity.
     pub map: Option<Vec<JointVector>>,
-    /// b [rad or m]; `None` for zero.
+    /// b (rad or m); `None` for zero.
     pub offset: Option<JointVector>,
     /// Number of the contact node that the tip of a Cartesian device leads; `None` for the last one.
     pub node: Option<usize>,
-    /// Stiffness of the spring between a Cartesian device's tip and that node [N/m].
+    /// Stiffness of the spring between a Cartesian device's tip and that node (N/m).
     pub stiffness: f64,
-    /// Damping of the damper beside it [N s/m].
+    /// Damping of the damper beside it (N s/m).
     pub damping: f64,
-    /// Maximum size of each of the device's efforts, where that is to be less than the device allows [N m or N].
+    /// Maximum size of each of the device's efforts, where that is to be less than the device allows (N m or N).
     pub effort_limit: Option<JointVector>,
 }
 
@@ -27,10 +27,10 @@ impl Default for DeviceSpec {
     }
 }
 
-/// Default stiffness between tip and node [N/m]: at 1 kHz a held spring gives no energy to a hand with K T/2 = 0.15 N
+/// Default stiffness between tip and node (N/m): at 1 kHz a held spring gives no energy to a hand with K T/2 = 0.15 N
 /// s/m of damping, which a hand on a desktop device has ten times over (Kuchenbecker, Park and Niemeyer 2003).
 const TIP_STIFFNESS: f64 = 300.0;
 
-/// Default damping between tip and node [N s/m]: larger than what holding takes, and below what differences of a
+/// Default damping between tip and node (N s/m): larger than what holding takes, and below what differences of a
 /// position that is measured in steps of 0.05 mm make audible.
 const TIP_DAMPING: f64 = 0.5;

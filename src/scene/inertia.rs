@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 /// give five digits or more.
 const INERTIA_ROUNDING: f64 = 1e-5;
 
-/// Returns the inertia of a body that `inertia` is the rounding of [kg m^2]: the matrix itself, or, where its least
+/// Returns the inertia of a body that `inertia` is the rounding of (kg m^2): the matrix itself, or, where its least
 /// eigenvalue is below zero by rounding, the matrix with its moments raised by as much. `None` if it is not symmetric,
 /// or farther from positive semidefinite than rounding takes it: no body has that inertia.
 pub(crate) fn positive_semidefinite(inertia: DMat3) -> Option<DMat3> {

@@ -30,16 +30,16 @@ pub struct LinkShape {
 /// A form about its origin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkForm {
-    /// Edges along the axes [m].
+    /// Edges along the axes (m).
     Box(DVec3),
     /// Along z.
     Cylinder {
-        /// [m]
+        /// (m)
         radius: f64,
-        /// [m]
+        /// (m)
         length: f64,
     },
-    /// By its radius [m].
+    /// By its radius (m).
     Sphere(f64),
     /// Triangles.
     Surface(LinkSurface),
@@ -48,14 +48,14 @@ pub enum LinkForm {
 /// Triangles, as a mesh file gave them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LinkSurface {
-    /// [m]
+    /// (m)
     pub nodes: Vec<DVec3>,
     /// Three node numbers each.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl LinkSurface {
-    /// Returns the least and the greatest coordinates [m].
+    /// Returns the least and the greatest coordinates (m).
     #[must_use]
     pub fn bounds(&self) -> [DVec3; 2] {
         let [least, greatest] = [DVec3::min, DVec3::max].map(|pick| self.nodes.iter().copied().reduce(pick));
@@ -78,7 +78,7 @@ impl LinkSurface {
         STANDARD.encode(bytes)
     }
 
-    /// Reads what [`LinkSurface::encode`] wrote, within `bounds` [m].
+    /// Reads what [`LinkSurface::encode`] wrote, within `bounds` (m).
     ///
     /// # Errors
     /// In words, where `text` is none or is too large.

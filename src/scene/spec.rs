@@ -1,7 +1,7 @@
 //! The content of a scene, validated: plain data that the other rooms read.
 //!
 //! All quantities are SI. Gains of the haptic loop are given joint by joint, because the coordinates of a chain may mix
-//! radians and metres: where a doc says [N m/rad], a prismatic joint has [N/m], and so on.
+//! radians and metres: where a doc says (N m/rad), a prismatic joint has (N/m), and so on.
 
 use crate::JointVector;
 use glam::{DMat3, DVec3};
@@ -9,11 +9,11 @@ use serde::Deserialize;
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// Greatest time between two ticks [s]: a whole period of a hand's fastest motion, 10 Hz. After more, the position
+/// Greatest time between two ticks (s): a whole period of a hand's fastest motion, 10 Hz. After more, the position
 /// before says nothing about the velocity.
 pub const GREATEST_INTERVAL: f64 = 0.1;
 
-/// Lever arm with which a prismatic joint counts among revolute ones [m]: a tenth of a metre, the size of a tool in a
+/// Lever arm with which a prismatic joint counts among revolute ones (m): a tenth of a metre, the size of a tool in a
 /// hand. Gains' defaults and errors over joints of both kinds are converted with it.
 pub const LEVER_ARM: f64 = 0.1;
 
@@ -28,9 +28,9 @@ pub struct ObjectSpec {
     pub skin: Option<SkinSpec>,
     /// Springs Kg to the mechanical ground; none where the skin's foundation holds the object.
     pub ground: Option<GroundSpec>,
-    /// Mass of each node [kg].
+    /// Mass of each node (kg).
     pub node_mass: f64,
-    /// Damping of each node against the ground [N s/m].
+    /// Damping of each node against the ground (N s/m).
     pub node_damping: f64,
 }
 
@@ -39,9 +39,9 @@ pub struct ObjectSpec {
 pub enum Shape {
     /// Two poles and `rings` rings of `segments` nodes on a sphere.
     Sphere {
-        /// [m]
+        /// (m)
         centre: DVec3,
-        /// [m]
+        /// (m)
         radius: f64,
         /// Rings between the poles, at equal steps of the polar angle.
         rings: usize,
@@ -50,32 +50,32 @@ pub enum Shape {
     },
     /// An icosahedron whose faces are divided, on a sphere: nearly equal triangles.
     Icosphere {
-        /// [m]
+        /// (m)
         centre: DVec3,
-        /// [m]
+        /// (m)
         radius: f64,
         /// Parts n of each edge of the icosahedron: 10 n^2 + 2 nodes.
         divisions: usize,
     },
     /// A closed triangle mesh: OBJ, STL or PLY by the file's extension. `scale` multiplies its coordinates (0.001 for
-    /// millimetres), `centre` is then added [m].
+    /// millimetres), `centre` is then added (m).
     Mesh {
         /// Relative to the scene file's folder when the scene names it so; ready to open here.
         file: PathBuf,
-        /// [1]
+        /// (1)
         scale: f64,
-        /// [m]
+        /// (m)
         centre: DVec3,
-        /// Mean edge to which the surface is refined, where it is [m].
+        /// Mean edge to which the surface is refined, where it is (m).
         refine: Option<f64>,
     },
     /// The tetrahedra of a Gmsh file, whose surface is touched; otherwise as `Mesh`.
     Tetrahedra {
         /// See `Mesh`.
         file: PathBuf,
-        /// [1]
+        /// (1)
         scale: f64,
-        /// [m]
+        /// (m)
         centre: DVec3,
     },
 }
@@ -95,22 +95,22 @@ pub enum Material {
 /// negative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SkinSpec {
-    /// Membrane tension T: resists a gradient of the displacement, in all directions alike [N/m].
+    /// Membrane tension T: resists a gradient of the displacement, in all directions alike (N/m).
     pub tension: f64,
-    /// Bending stiffness b: resists a Laplacian of the displacement [N m].
+    /// Bending stiffness b: resists a Laplacian of the displacement (N m).
     pub bending: f64,
-    /// Foundation k: resists displacement [N/m^3].
+    /// Foundation k: resists displacement (N/m^3).
     pub foundation: f64,
 }
 
 /// An isotropic, linearly elastic solid, homogeneous but for its inclusions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ElasticSpec {
-    /// Young's modulus E [Pa].
+    /// Young's modulus E (Pa).
     pub young: f64,
-    /// Poisson's ratio nu, above -1 and below 1/2 [1].
+    /// Poisson's ratio nu, above -1 and below 1/2 (1).
     pub poisson: f64,
-    /// Size of the cubes of the lattice that fills a surface; none where the shape is tetrahedra [m].
+    /// Size of the cubes of the lattice that fills a surface; none where the shape is tetrahedra (m).
     pub cell: Option<f64>,
     /// Parts with another stiffness; where two overlap, the later one counts.
     pub inclusions: Vec<InclusionSpec>,
@@ -121,9 +121,9 @@ pub struct ElasticSpec {
 pub struct InclusionSpec {
     /// Which part.
     pub place: InclusionPlace,
-    /// Young's modulus [Pa].
+    /// Young's modulus (Pa).
     pub young: f64,
-    /// Poisson's ratio [1].
+    /// Poisson's ratio (1).
     pub poisson: f64,
 }
 
@@ -132,9 +132,9 @@ pub struct InclusionSpec {
 pub enum InclusionPlace {
     /// The part inside a sphere.
     Sphere {
-        /// [m]
+        /// (m)
         centre: DVec3,
-        /// [m]
+        /// (m)
         radius: f64,
     },
     /// The tetrahedra of a physical volume of the Gmsh file, by its number.
@@ -158,7 +158,7 @@ impl std::fmt::Display for InclusionSpec {
 pub struct SpringSpec {
     /// How each spring resists.
     pub kind: SpringKind,
-    /// Stiffness of each spring [N/m].
+    /// Stiffness of each spring (N/m).
     pub stiffness: f64,
 }
 
@@ -175,7 +175,7 @@ pub enum SpringKind {
 /// Ground springs Kg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundSpec {
-    /// Stiffness at each grounded node, in all directions alike [N/m].
+    /// Stiffness at each grounded node, in all directions alike (N/m).
     pub stiffness: f64,
     /// Which nodes it holds.
     pub nodes: GroundNodes,
@@ -188,7 +188,7 @@ pub enum GroundNodes {
     All,
     /// Nodes by number.
     Listed(Vec<u32>),
-    /// Nodes whose rest position lies below this height z [m].
+    /// Nodes whose rest position lies below this height z (m).
     Below(f64),
 }
 
@@ -209,20 +209,20 @@ pub struct JointSpec {
     pub name: String,
     /// Turning or sliding.
     pub kind: JointKind,
-    /// Joint frame's origin in the parent link's frame at q = 0 [m]; all frames are parallel to the world at q = 0.
+    /// Joint frame's origin in the parent link's frame at q = 0 (m); all frames are parallel to the world at q = 0.
     pub origin: DVec3,
     /// Axis of rotation or translation in the joint's frame; a unit vector after validation.
     pub axis: DVec3,
-    /// Least and greatest joint coordinate [rad or m].
+    /// Least and greatest joint coordinate (rad or m).
     pub limits: [f64; 2],
-    /// Mass of the link [kg].
+    /// Mass of the link (kg).
     pub mass: f64,
-    /// Centre of mass in the link's frame [m].
+    /// Centre of mass in the link's frame (m).
     pub centre_of_mass: DVec3,
-    /// Inertia about the centre of mass, along the link frame's axes, symmetric and positive semidefinite [kg m^2].
+    /// Inertia about the centre of mass, along the link frame's axes, symmetric and positive semidefinite (kg m^2).
     pub inertia: DMat3,
     /// Reflected inertia of the actuator about the joint, positive, so that the chain's inertia is positive definite in
-    /// every configuration [kg m^2 or kg].
+    /// every configuration (kg m^2 or kg).
     pub rotor_inertia: f64,
     /// Contact nodes of this link, in the link's frame.
     pub nodes: Vec<ProxyNodeSpec>,
@@ -232,9 +232,9 @@ pub struct JointSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum JointKind {
-    /// Turns about its axis; its coordinate is an angle [rad].
+    /// Turns about its axis; its coordinate is an angle (rad).
     Revolute,
-    /// Slides along its axis; its coordinate is a length [m].
+    /// Slides along its axis; its coordinate is a length (m).
     Prismatic,
 }
 
@@ -258,11 +258,11 @@ impl JointKind {
 /// A contact node of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProxyNodeSpec {
-    /// In the link's frame [m].
+    /// In the link's frame (m).
     pub position: DVec3,
-    /// Zero for the paper's point nodes [m].
+    /// Zero for the paper's point nodes (m).
     pub radius: f64,
-    /// Length of the link that the node stands for; zero for a node by itself [m].
+    /// Length of the link that the node stands for; zero for a node by itself (m).
     pub length: f64,
 }
 
@@ -272,13 +272,13 @@ pub struct ContactSpec {
     /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
     /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a
     /// stiffness per length instead, that of a node that stands for the mean length; [`ContactSpec::node_stiffness`]
-    /// gives each node's own [N/m].
+    /// gives each node's own (N/m).
     pub stiffness: f64,
-    /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that [N/m^2].
+    /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that (N/m^2).
     pub stiffness_per_length: Option<f64>,
     /// How equation (2) is solved.
     pub algorithm: Algorithm,
-    /// Relative residual at which a configuration counts as converged [1].
+    /// Relative residual at which a configuration counts as converged (1).
     pub tolerance: f64,
     /// After as many a configuration that has not converged is flagged.
     pub max_iterations: u32,
@@ -306,7 +306,7 @@ impl ContactSpec {
         if self.algorithm == Algorithm::Paper { ContactSurface::Facets } else { self.surface }
     }
 
-    /// Returns Kc of a node that stands for `length` of a link [m], in [N/m]: with a stiffness per length k' the third
+    /// Returns Kc of a node that stands for `length` of a link (m), in (N/m): with a stiffness per length k' the third
     /// part of k' times the length, so that the contact point's kc = 3 Kc is k' times the length, and the whole link's
     /// does not depend on the number of its nodes.
     #[must_use]
@@ -317,7 +317,7 @@ impl ContactSpec {
         }
     }
 
-    /// The same over [`ContactSpec::stiffness`] [1].
+    /// The same over [`ContactSpec::stiffness`] (1).
     #[must_use]
     pub fn share(&self, length: f64) -> f64 {
         if self.stiffness_per_length.is_some() { self.node_stiffness(length) / self.stiffness } else { 1.0 }
@@ -346,63 +346,63 @@ pub struct GridSpec {
 /// Grid coordinates `start + k step`, `k < count`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisSpec {
-    /// [rad or m]
+    /// (rad or m)
     pub start: f64,
-    /// Positive [rad or m].
+    /// Positive (rad or m).
     pub step: f64,
     /// At least 2.
     pub count: usize,
 }
 
-/// How far beyond an end a grid line may lie and still count, in steps [1]: spacings such as pi/60 are written with a
+/// How far beyond an end a grid line may lie and still count, in steps (1): spacings such as pi/60 are written with a
 /// handful of digits, and 1e-6 of a step changes no torque that is interpolated between lines.
 pub const GRID_STEP_SLACK: f64 = 1e-6;
 
 /// A grid line this fraction of a step outside the samples' range still lies on its end.
 pub const GRID_LINE: f64 = 1e-9;
 
-/// Threshold Ith of the contact index unless the scene names one [1]: the paper's.
+/// Threshold Ith of the contact index unless the scene names one (1): the paper's.
 pub const THRESHOLD: f64 = 0.5;
 
-/// Slope Ks of the boundary layer at a revolute joint unless the scene names one [N m/rad].
+/// Slope Ks of the boundary layer at a revolute joint unless the scene names one (N m/rad).
 pub const BOUNDARY_SLOPE: f64 = 15.0;
 
 /// The 1 kHz loop (section 3.1).
 #[derive(Clone, Debug, PartialEq)]
 pub struct HapticsSpec {
-    /// Ticks per second [Hz].
+    /// Ticks per second (Hz).
     pub rate: f64,
-    /// Contact where the interpolated contact index exceeds this, Ith [1].
+    /// Contact where the interpolated contact index exceeds this, Ith (1).
     pub threshold: f64,
     /// How the torque is interpolated between grid points.
     pub interpolation: Interpolation,
-    /// Slope Ks of the boundary layer at each joint [N m/rad].
+    /// Slope Ks of the boundary layer at each joint (N m/rad).
     pub boundary_slope: JointVector,
-    /// mu of the passivity condition Ks <= mu bv / T [1].
+    /// mu of the passivity condition Ks <= mu bv / T (1).
     pub passivity_factor: f64,
-    /// Extra damping bv of the proxy at each joint [N m s/rad].
+    /// Extra damping bv of the proxy at each joint (N m s/rad).
     pub proxy_damping: JointVector,
     /// Whether the scene leaves bv to the dataset, which raises it as far as passivity asks.
     pub proxy_damping_is_free: bool,
     /// Which inertia the proxy moves with.
     pub proxy_inertia: ProxyInertia,
-    /// Stiffness Kvc of the virtual coupling at each joint [N m/rad].
+    /// Stiffness Kvc of the virtual coupling at each joint (N m/rad).
     pub coupling_stiffness: JointVector,
-    /// Damping Bvc of the virtual coupling at each joint [N m s/rad].
+    /// Damping Bvc of the virtual coupling at each joint (N m s/rad).
     pub coupling_damping: JointVector,
-    /// Device damping bd at each joint [N m s/rad].
+    /// Device damping bd at each joint (N m s/rad).
     pub device_damping: JointVector,
-    /// Apparent inertia of the device at each joint [kg m^2].
+    /// Apparent inertia of the device at each joint (kg m^2).
     pub device_inertia: JointVector,
-    /// Greatest torque of each joint, in size [N m].
+    /// Greatest torque of each joint, in size (N m).
     pub torque_limit: JointVector,
-    /// Greatest rate of change of each joint's torque, in size [N m/s].
+    /// Greatest rate of change of each joint's torque, in size (N m/s).
     pub torque_rate_limit: JointVector,
-    /// Greatest speed of each joint of the device; what moves faster is taken for a fault of the device [rad/s].
+    /// Greatest speed of each joint of the device; what moves faster is taken for a fault of the device (rad/s).
     pub speed_limit: JointVector,
-    /// Resolution of each joint's encoder; zero if not given [rad].
+    /// Resolution of each joint's encoder; zero if not given (rad).
     pub encoder_step: JointVector,
-    /// Dry friction of each joint of the device; zero if not given [N m].
+    /// Dry friction of each joint of the device; zero if not given (N m).
     pub device_friction: JointVector,
     /// Effects of the tick beyond the paper's, if any.
     pub effects: HapticEffects,
@@ -435,33 +435,33 @@ impl HapticEffects {
 /// Coulomb friction of elastic-plastic bristles, one at each proxy node in contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionSpec {
-    /// Tangential over normal force while slipping [1].
+    /// Tangential over normal force while slipping (1).
     pub coefficient: f64,
-    /// Tangential over normal force at which sticking ends; at least `coefficient` [1].
+    /// Tangential over normal force at which sticking ends; at least `coefficient` (1).
     pub static_coefficient: f64,
-    /// Stiffness of a bristle: how fast friction builds up while sticking [N/m].
+    /// Stiffness of a bristle: how fast friction builds up while sticking (N/m).
     pub stiffness: f64,
-    /// Damping of a bristle while sticking [N s/m].
+    /// Damping of a bristle while sticking (N s/m).
     pub damping: f64,
-    /// Where the scene's text names it [bytes].
+    /// Where the scene's text names it (bytes).
     pub place: Range<usize>,
 }
 
 /// Dampers along the normals of the contacts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactDampingSpec {
-    /// c of one contact [N s/m].
+    /// c of one contact (N s/m).
     pub damping: f64,
-    /// Where the scene's text names it [bytes].
+    /// Where the scene's text names it (bytes).
     pub place: Range<usize>,
 }
 
 /// Four-channel coupling (Lawrence 1993).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FourChannelSpec {
-    /// C1 to C4 as shares of their ideal values Zs, 1, 1 and -Zm, from 0 to 1 [1].
+    /// C1 to C4 as shares of their ideal values Zs, 1, 1 and -Zm, from 0 to 1 (1).
     pub channels: [f64; 4],
-    /// Time constant of the low-pass filter on accelerations and on the estimated force of the hand [s].
+    /// Time constant of the low-pass filter on accelerations and on the estimated force of the hand (s).
     pub filter: f64,
 }
 
@@ -506,18 +506,18 @@ impl Interpolation {
 /// The simulated hand: a mass on the device, pulled along the motion by a spring and a damper at each joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandSpec {
-    /// Between the motion and the hand [N m/rad].
+    /// Between the motion and the hand (N m/rad).
     pub stiffness: JointVector,
-    /// Between the motion and the hand [N m s/rad].
+    /// Between the motion and the hand (N m s/rad).
     pub damping: JointVector,
-    /// Inertia of the hand itself, moving with the device [kg m^2].
+    /// Inertia of the hand itself, moving with the device (kg m^2).
     pub inertia: JointVector,
 }
 
 /// The graphics loop (section 3.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GraphicsSpec {
-    /// Frames per second [Hz].
+    /// Frames per second (Hz).
     pub rate: f64,
     /// Effects beyond the paper's.
     pub effects: GraphicsEffects,
@@ -526,11 +526,11 @@ pub struct GraphicsSpec {
 /// Effects of the graphics loop: each absent unless the scene names it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GraphicsEffects {
-    /// Acceleration of gravity on the object's nodes [m/s^2].
+    /// Acceleration of gravity on the object's nodes (m/s^2).
     pub gravity: Option<DVec3>,
     /// Springs stiffen with strain.
     pub stiffening: Option<StiffeningSpec>,
-    /// Time constant of a low-pass filter on the contact forces that move the object [s].
+    /// Time constant of a low-pass filter on the contact forces that move the object (s).
     pub smoothing: Option<f64>,
     /// The object has no dynamics: n = n0 + C f.
     pub quasi_static: bool,
@@ -554,9 +554,9 @@ impl GraphicsEffects {
 /// How springs stiffen with strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StiffeningSpec {
-    /// Stiffness at large strains over that at rest, kappa; more than 1 [1].
+    /// Stiffness at large strains over that at rest, kappa; more than 1 (1).
     pub factor: f64,
-    /// Strain around which it rises, eps [1].
+    /// Strain around which it rises, eps (1).
     pub strain: f64,
 }
 
@@ -572,8 +572,8 @@ pub struct MotionSpec {
 /// The hand passes `q` at `time`; between waypoints it moves along a smooth (minimum-jerk) path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
-    /// Since the motion began [s].
+    /// Since the motion began (s).
     pub time: f64,
-    /// Configuration [rad or m].
+    /// Configuration (rad or m).
     pub q: JointVector,
 }

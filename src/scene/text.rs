@@ -3,7 +3,7 @@
 use crate::input;
 use std::{io::Read, path::Path};
 
-/// Longest text that is read [bytes]: a hundred times as long as the longest robot file in public collections.
+/// Longest text that is read (bytes): a hundred times as long as the longest robot file in public collections.
 const MAX_BYTES: u64 = 1 << 24;
 
 /// Returns the text of the file at `path`.

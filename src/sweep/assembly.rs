@@ -15,10 +15,10 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-/// Points of a piece [1]: enough that threads rarely go for another, and small enough for all threads to have some.
+/// Points of a piece (1): enough that threads rarely go for another, and small enough for all threads to have some.
 const PIECE: usize = 1 << 12;
 
-/// Memory that it takes: the buffers before the file [bytes].
+/// Memory that it takes: the buffers before the file (bytes).
 pub(super) fn buffers() -> usize {
     dataset::BUFFER + rayon::current_num_threads() * dataset::PIECE_BUFFER
 }

@@ -70,7 +70,7 @@ pub struct Bake<'a> {
     /// Random configurations at which the dataset's error is measured; 0 leaves it out. By default a tenth of the
     /// points in contact, at least 100 and at most 1,000.
     pub measured: Option<usize>,
-    /// Rms error that the grid was chosen for, over the rms torque, where it was [1].
+    /// Rms error that the grid was chosen for, over the rms torque, where it was (1).
     pub aim: Option<f64>,
     /// Date that the dataset bears, ISO 8601, UTC.
     pub date: &'a str,

@@ -21,18 +21,18 @@ pub enum BackendChoice {
     Gpu,
 }
 
-/// Time that a GPU takes to begin [s]. An H200's driver compiled the kernels for 6 s at the first start, and for 2 s at
+/// Time that a GPU takes to begin (s). An H200's driver compiled the kernels for 6 s at the first start, and for 2 s at
 /// later ones (benches/README.md). What the CPU solves meanwhile no GPU solves sooner.
 const GPU_START: f64 = 6.0;
 
 impl BackendChoice {
-    /// The choice for work that takes the CPU `seconds` [s].
+    /// The choice for work that takes the CPU `seconds` (s).
     pub(crate) fn for_work(self, seconds: f64) -> Self {
         if self == Self::Auto && asked_for().is_empty() && !is_worth_a_gpu(seconds) { Self::Cpu } else { self }
     }
 }
 
-/// Whether work that takes the CPU `seconds` [s] is worth the start of a GPU.
+/// Whether work that takes the CPU `seconds` (s) is worth the start of a GPU.
 pub(crate) fn is_worth_a_gpu(seconds: f64) -> bool {
     seconds > GPU_START
 }
@@ -65,7 +65,7 @@ pub enum BackendError {
     Gpu(#[from] GpuError),
 }
 
-/// Memory of a thread [bytes]: the 2 MiB of its stack, and half as much for what the system and Rust add at its start,
+/// Memory of a thread (bytes): the 2 MiB of its stack, and half as much for what the system and Rust add at its start,
 /// which ends the process where it does not fit.
 const THREAD_MEMORY: usize = 3 << 20;
 

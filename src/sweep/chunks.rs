@@ -170,7 +170,7 @@ impl ChunkSize {
 /// A stretch of points under way.
 struct Chunk {
     points: Range<usize>,
-    /// Gaps of the points that are known to be free [m]; nothing where free space is not looked for.
+    /// Gaps of the points that are known to be free (m); nothing where free space is not looked for.
     free_gaps: Vec<Option<f32>>,
 }
 

@@ -82,7 +82,7 @@ pub(super) struct Rows {
     /// End of each row in `nodes`; it begins where the one before ends.
     pub ends: Vec<u64>,
     pub nodes: Vec<u32>,
-    /// Three numbers a node [N].
+    /// Three numbers a node (N).
     pub forces: Vec<f32>,
 }
 
@@ -179,7 +179,7 @@ pub(super) struct Opening {
 }
 
 impl Opening {
-    /// Length [bytes].
+    /// Length (bytes).
     pub const BYTES: usize = 4 * 8;
 
     /// Reads it; `None` where its numbers cannot be counted to.
@@ -193,7 +193,7 @@ impl Opening {
         [self.first, self.points, self.contacts, self.touches].map(|count| (count as u64).to_le_bytes())
     }
 
-    /// Lengths of the columns behind it, by [`Section`] [bytes].
+    /// Lengths of the columns behind it, by [`Section`] (bytes).
     fn lengths(self, width: Width) -> [usize; SECTIONS] {
         let Self { points: p, contacts: c, touches: t, .. } = self;
         let wide = [(p, width.joints * 8), (p, 8), (p, 8), (p, width.touches * 8)];
@@ -215,7 +215,7 @@ impl Opening {
         })
     }
 
-    /// Length of all columns behind it [bytes].
+    /// Length of all columns behind it (bytes).
     pub fn columns(self, width: Width) -> usize {
         self.lengths(width).into_iter().fold(0, usize::saturating_add)
     }
@@ -303,7 +303,7 @@ impl Columns {
         }
     }
 
-    /// Adds a point at which nothing touches and nothing was solved, with a lower bound of its gap [m].
+    /// Adds a point at which nothing touches and nothing was solved, with a lower bound of its gap (m).
     pub fn push_free(&mut self, gap: f32, shape: Shape) {
         self.torque.resize(self.torque.len() + shape.joints, 0.0);
         self.energy.push(0.0);

@@ -71,7 +71,7 @@ impl Direct {
         self.0.borrow_owner().chain.joints.len()
     }
 
-    /// The equilibrium at `q` in full, one coordinate a joint [rad or m].
+    /// The equilibrium at `q` in full, one coordinate a joint (rad or m).
     ///
     /// # Errors
     /// When `q` is no configuration.
@@ -84,7 +84,7 @@ impl Direct {
         Ok(Inspection::new(self.model(), q))
     }
 
-    /// Torques and statuses of many configurations, joint fastest as they are, on all cores [N m or N]. Each is solved
+    /// Torques and statuses of many configurations, joint fastest as they are, on all cores (N m or N). Each is solved
     /// from rest; where there are several equilibria, a bake may have found a lower one from neighbouring grid points.
     ///
     /// # Errors

@@ -23,7 +23,7 @@ pub enum SweepError {
     Memory {
         /// Grid points.
         points: usize,
-        /// Memory of their columns [bytes].
+        /// Memory of their columns (bytes).
         bytes: usize,
         /// Error of the allocator.
         source: TryReserveError,

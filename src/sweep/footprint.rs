@@ -13,10 +13,10 @@ use crate::{
 /// with the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Footprint {
-    /// Memory [bytes].
+    /// Memory (bytes).
     pub memory: Bounds,
     /// The dataset on disk, its header aside; twice as much for a moment, while it is put together from its part. Zero
-    /// for a sweep in memory [bytes].
+    /// for a sweep in memory (bytes).
     pub disk: Bounds,
 }
 
@@ -36,7 +36,7 @@ impl Bounds {
     }
 }
 
-/// Results of `points` points at each of which `touching` nodes of the proxy touch [bytes].
+/// Results of `points` points at each of which `touching` nodes of the proxy touch (bytes).
 pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
     let contacts = if shape.with_forces { node_forces(touching, shape) } else { 0 };
     let touches = touching * shape.width().touches;
@@ -44,7 +44,7 @@ pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
 }
 
 /// Chunks on their way: `solved` configurations of each and their equilibria, and the columns of `points` points, and
-/// of the chunks before that are being kept [bytes].
+/// of the chunks before that are being kept (bytes).
 pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape) -> usize {
     // Lists grow by doubling.
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());

@@ -21,7 +21,7 @@ const PORTIONS: usize = 8;
 /// Maximum number of points that are drawn: where little is in contact, its fraction is known better, too.
 const DRAWN: usize = 16 * PORTION * PORTIONS;
 
-/// Time after which no further portion is solved [s]: expensive contact is sampled less.
+/// Time after which no further portion is solved (s): expensive contact is sampled less.
 const LONGEST: f64 = 0.5;
 
 /// Grids with fewer points are not sampled: they are done as soon.
@@ -33,22 +33,22 @@ const SEED: u64 = 0x2545_f491_4f6c_dd1d;
 /// Expected cost of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Forecast {
-    /// Fraction of the points in contact [1].
+    /// Fraction of the points in contact (1).
     pub contact_fraction: f64,
     /// Solving all points from rest, without the search for lower equilibria and the measurement of the error; absent
-    /// for a GPU, whose time for few points says nothing of many [s].
+    /// for a GPU, whose time for few points says nothing of many (s).
     pub seconds: Option<f64>,
-    /// The dataset on disk [bytes].
+    /// The dataset on disk (bytes).
     pub disk: usize,
     /// The results on disk while they are collected, with the forces from which lower equilibria are searched for
-    /// [bytes].
+    /// (bytes).
     pub part: usize,
     /// Random points that were sampled; some may have been drawn twice.
     pub sampled: usize,
 }
 
 impl Sweep<'_> {
-    /// Returns the time in which `cpu` solves the whole grid, zero where that is small [s]. The sample is kept as the
+    /// Returns the time in which `cpu` solves the whole grid, zero where that is small (s). The sample is kept as the
     /// forecast.
     ///
     /// # Errors

@@ -32,7 +32,7 @@ use std::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
-/// Rounding error of a gap and of the motion it is held against, relative to the lengths of chain and object [1]: a
+/// Rounding error of a gap and of the motion it is held against, relative to the lengths of chain and object (1): a
 /// pose is a product of at most seven rotations, a distance a difference of coordinates, each good to some ten eps of
 /// those lengths.
 const FREE_SPACE_ROUNDING: f64 = 1e-12;
@@ -60,7 +60,7 @@ pub struct FreeSpace<'a> {
 /// Bounds on the gaps of some grid points, known before anything is solved.
 pub struct FreeGaps {
     first: usize,
-    /// Bits of a positive lower bound of the gap [m]; of NaN where the point is to be solved.
+    /// Bits of a positive lower bound of the gap (m); of NaN where the point is to be solved.
     bounds: Vec<AtomicU32>,
 }
 
@@ -77,9 +77,9 @@ type Place = [f64; MAX_JOINTS];
 /// The arm in the middle of a block.
 struct Placed {
     centre: JointVector,
-    /// Half-widths of the block with its margin [rad or m].
+    /// Half-widths of the block with its margin (rad or m).
     wide: JointVector,
-    /// Clearance of the node that is nearest to the object, and what rounding may add to it [m].
+    /// Clearance of the node that is nearest to the object, and what rounding may add to it (m).
     least: f64,
     rounding: f64,
     /// Whether the block is proven free.
@@ -160,7 +160,7 @@ impl<'a> FreeSpace<'a> {
 }
 
 impl FreeGaps {
-    /// A positive lower bound of the gap at `point`, within `f32` rounding; `None` where the point is to be solved [m].
+    /// A positive lower bound of the gap at `point`, within `f32` rounding; `None` where the point is to be solved (m).
     #[must_use]
     pub fn gap(&self, point: usize) -> Option<f32> {
         let bits = self.bounds.get(point.checked_sub(self.first)?)?.load(Ordering::Relaxed);
@@ -221,11 +221,11 @@ impl Block {
 
 /// Bounds on how far joints move nodes.
 struct JacobianBounds {
-    /// r_ij, joint fastest [m/rad, or 1].
+    /// r_ij, joint fastest (m/rad, or 1).
     bounds: Vec<JointVector>,
     /// Greatest of each joint.
     greatest: JointVector,
-    /// Sum of all lengths: no node is farther from the base [m].
+    /// Sum of all lengths: no node is farther from the base (m).
     length: f64,
 }
 

@@ -40,7 +40,7 @@ pub struct Progress {
     pub points: usize,
     /// Points done that are in contact.
     pub contact_points: usize,
-    /// Points a second, of this run; 0 before the first chunk [1/s].
+    /// Points a second, of this run; 0 before the first chunk (1/s).
     pub rate: f64,
     /// Memory and disk that the sweep takes, at least and at most.
     pub footprint: Footprint,

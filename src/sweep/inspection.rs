@@ -10,19 +10,19 @@ use serde::Serialize;
 /// One configuration in full. Vectors are in the world's frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspection {
-    /// Configuration [rad or m].
+    /// Configuration (rad or m).
     pub q: Vec<f64>,
     /// Status, in lower case.
     pub status: String,
     /// Iterations of the contact solver.
     pub iterations: u32,
-    /// Relative residual [1].
+    /// Relative residual (1).
     pub residual: f64,
-    /// Stored energy U [J].
+    /// Stored energy U (J).
     pub energy: f64,
-    /// Smallest signed distance of the proxy to the surface at rest [m].
+    /// Smallest signed distance of the proxy to the surface at rest (m).
     pub gap: f64,
-    /// tau [N m or N].
+    /// tau (N m or N).
     pub torque: Vec<f64>,
     /// All contact nodes of the proxy.
     pub proxy_nodes: Vec<ProxyNode>,
@@ -35,9 +35,9 @@ pub struct Inspection {
 pub struct ProxyNode {
     /// Name of the joint whose link carries it.
     pub link: String,
-    /// x_i [m].
+    /// x_i (m).
     pub position: DVec3,
-    /// Columns of J_i, one per joint [m/rad, or 1].
+    /// Columns of J_i, one per joint (m/rad, or 1).
     pub jacobian: Vec<DVec3>,
     /// The contact there, if it touches anything.
     pub contact: Option<Contact>,
@@ -46,7 +46,7 @@ pub struct ProxyNode {
 /// A contact of a proxy node.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Contact {
-    /// Force on the proxy node [N].
+    /// Force on the proxy node (N).
     pub force: DVec3,
     /// The object's nodes that carry its reaction.
     pub nodes: Vec<u32>,
@@ -57,11 +57,11 @@ pub struct Contact {
 /// A node of the object's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ObjectNode {
-    /// n0 [m].
+    /// n0 (m).
     pub rest: DVec3,
-    /// n [m].
+    /// n (m).
     pub position: DVec3,
-    /// Contact force f_j on it [N].
+    /// Contact force f_j on it (N).
     pub force: DVec3,
 }
 
@@ -107,7 +107,7 @@ impl Inspection {
         }
     }
 
-    /// tau once more, as the sum of J_i^T (force on x_i) over the listed contacts [N m or N].
+    /// tau once more, as the sum of J_i^T (force on x_i) over the listed contacts (N m or N).
     #[must_use]
     pub fn torque_of_contacts(&self) -> JointVector {
         let mut torque = JointVector::zeros(self.q.len());

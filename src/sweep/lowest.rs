@@ -39,7 +39,7 @@ use std::{
 };
 
 /// Excess of a grid point's energy over what a neighbour predicts, over the work of the torque along one grid step,
-/// above which the neighbour's equilibrium is tried there [1]. Smaller: more searches, most of them at kinks of the
+/// above which the neighbour's equilibrium is tried there (1). Smaller: more searches, most of them at kinks of the
 /// torque, without effect. Larger: jumps of U up to this share of a step's work may stay. Of the 4,086 points in
 /// contact of a sphere of 102 nodes on springs, dented to a third of its radius, 3 degrees apart, where a search takes
 /// as long as a solution from rest:
@@ -50,12 +50,12 @@ use std::{
 /// | lowered | 84 | 68 | 56 | 42 | 30 | 14 |
 const EDGE_TOLERANCE: f64 = 0.1;
 
-/// Error of the energy of an equilibrium that is balanced to rounding, over the energy [1]: a thousand roundings of f64
+/// Error of the energy of an equilibrium that is balanced to rounding, over the energy (1): a thousand roundings of f64
 /// sums over some hundred nodes, and far below differences that can be felt. An imbalance r adds about r^2, the energy
 /// being least at the equilibrium.
 const ENERGY_ERROR: f64 = 1e-10;
 
-/// Points that are looked at together [1]: enough for all threads, few enough that what is known of them takes little
+/// Points that are looked at together (1): enough for all threads, few enough that what is known of them takes little
 /// memory.
 const STRETCH: usize = 1 << 14;
 
@@ -66,13 +66,13 @@ pub struct Lowered {
     pub points: usize,
     /// Points among them that had not converged from rest.
     pub converged: usize,
-    /// Greatest decrease of U at a point that had converged, over U [1].
+    /// Greatest decrease of U at a point that had converged, over U (1).
     pub greatest: f64,
     /// Rounds, the last of which changed nothing; of a store the sum over all batches of new nodes.
     pub rounds: usize,
     /// Searches from a neighbour's forces.
     pub searches: usize,
-    /// Wall time [s].
+    /// Wall time (s).
     pub seconds: f64,
 }
 
@@ -83,10 +83,10 @@ pub(super) trait Lattice: Sync {
     /// What is kept of a new result.
     type Row: Send;
 
-    /// Returns the configuration of a point [rad or m].
+    /// Returns the configuration of a point (rad or m).
     fn configuration(&self, point: Self::Point) -> JointVector;
 
-    /// Returns the neighbours of a point that have results, each with the lattice's spacing there [rad or m].
+    /// Returns the neighbours of a point that have results, each with the lattice's spacing there (rad or m).
     fn neighbours(&self, point: Self::Point) -> impl Iterator<Item = (Self::Point, JointVector)>;
 
     /// Returns the status of a point.
@@ -95,7 +95,7 @@ pub(super) trait Lattice: Sync {
     /// Returns the result of a point.
     fn result(&self, point: Self::Point) -> PointResult;
 
-    /// Returns the forces on the object's nodes at a point, ascending by node [N].
+    /// Returns the forces on the object's nodes at a point, ascending by node (N).
     fn forces(&self, point: Self::Point) -> Vec<NodeForce>;
 
     /// Returns what is kept of a new result, found at `q` by `solver`.
@@ -140,7 +140,7 @@ pub(super) fn correct(
 }
 
 impl Lowered {
-    /// Counts a point whose result from rest, status and energy [J], gave way to one of lower `energy` [J].
+    /// Counts a point whose result from rest, status and energy (J), gave way to one of lower `energy` (J).
     pub(super) fn count(&mut self, (status, before): (Status, f64), energy: f64) {
         self.points += 1;
         if status == Status::Contact {
@@ -230,8 +230,8 @@ fn starts<L: Lattice>(lattice: &L, point: L::Point, may_start: impl Fn(L::Point)
     starts
 }
 
-/// Returns the energy here beyond what the equilibrium there predicts and the tolerance allows [J]; above zero a search
-/// from there is worth while. `spacing` is that of the lattice along each axis [rad or m].
+/// Returns the energy here beyond what the equilibrium there predicts and the tolerance allows (J); above zero a search
+/// from there is worth while. `spacing` is that of the lattice along each axis (rad or m).
 pub(super) fn excess(
     (q, here): (&JointVector, &PointResult),
     (from, there): (&JointVector, &PointResult),

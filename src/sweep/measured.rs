@@ -33,13 +33,13 @@ const CONFIGURATIONS: Range<usize> = 100..1000;
 /// Seed of the random configurations; differs from the pilot's.
 const SEED: u64 = 0x94d0_49bb_1331_11eb;
 
-/// Most grid points of which an interpolation is formed as a whole [1]: some 50 MB.
+/// Most grid points of which an interpolation is formed as a whole (1): some 50 MB.
 const WHOLE: usize = 1 << 18;
 
-/// Most grid points around a configuration of which an interpolation is formed [1]: some milliseconds of time.
+/// Most grid points around a configuration of which an interpolation is formed (1): some milliseconds of time.
 const AROUND: usize = 1 << 10;
 
-/// Grid points that a thread looks through at a time [1]: larger leaves threads without, smaller takes memory.
+/// Grid points that a thread looks through at a time (1): larger leaves threads without, smaller takes memory.
 const STRETCH: usize = 1 << 12;
 
 /// How the error of a dataset is measured.

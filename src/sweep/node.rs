@@ -29,15 +29,15 @@ use crate::{
     },
 };
 
-/// Depth behind the boundary at which contact is solved for a free node, over its gap [1]. Larger: the slope is that of
+/// Depth behind the boundary at which contact is solved for a free node, over its gap (1). Larger: the slope is that of
 /// deeper contact, of which more nodes touch. Smaller: w is a root of less energy, which errs more.
 const DEPTH_SHARE: f64 = 0.05;
 
-/// Least depth, and least change of the gap over a cell of the base, that counts [m]: a picometre is far below any depth
+/// Least depth, and least change of the gap over a cell of the base, that counts (m): a picometre is far below any depth
 /// that a force belongs to.
 const LEAST_GAP: f64 = 1e-12;
 
-/// Farthest boundary that is looked for, in cells of the base along any axis [1]: beyond, no cell of the node holds
+/// Farthest boundary that is looked for, in cells of the base along any axis (1): beyond, no cell of the node holds
 /// contact.
 const FARTHEST: f64 = 2.0;
 
@@ -78,11 +78,11 @@ pub(super) struct Solved {
 
 /// Everything on which a node depends beside its configuration.
 pub(super) struct Scale {
-    /// Spacing of the base along each axis [rad or m].
+    /// Spacing of the base along each axis (rad or m).
     steps: Vec<f64>,
-    /// No node of the proxy moves farther when each joint moves by the base's spacing [m].
+    /// No node of the proxy moves farther when each joint moves by the base's spacing (m).
     reach: f64,
-    /// Contact stiffness [N/m].
+    /// Contact stiffness (N/m).
     kc: f64,
 }
 
@@ -100,7 +100,7 @@ impl Scale {
         Self { steps, reach, kc: model.kc }
     }
 
-    /// No node of the proxy moves farther when each joint moves by the spacing of `level` [m].
+    /// No node of the proxy moves farther when each joint moves by the spacing of `level` (m).
     pub fn reach(&self, level: u32) -> f64 {
         self.reach * 0.5_f64.powi(level as i32)
     }
@@ -280,7 +280,7 @@ fn behind(
     None
 }
 
-/// Gradient of the gap by central differences [m/rad].
+/// Gradient of the gap by central differences (m/rad).
 fn gradient(solver: &mut Solver<'_>, q: &JointVector, steps: &[f64]) -> JointVector {
     let mut slopes = *q;
     for (a, h) in steps.iter().enumerate() {

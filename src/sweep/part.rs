@@ -27,7 +27,7 @@ use std::{
 };
 
 const MAGIC: &[u8] = b"haptize part 5\n";
-/// Length and checksum before each body [bytes].
+/// Length and checksum before each body (bytes).
 const FRAME: usize = 8 + 4;
 
 /// How the body of a notice begins: as no block of columns does, whose first point has no such number.
@@ -108,7 +108,7 @@ impl Binding {
 pub(super) struct Part {
     path: PathBuf,
     file: File,
-    /// Where the frame behind the binding begins [bytes].
+    /// Where the frame behind the binding begins (bytes).
     results: u64,
 }
 
@@ -238,7 +238,7 @@ impl Part {
         Ok(self.opening(&mut BufReader::new(&self.file), &mut left)?.is_some() && left > 0)
     }
 
-    /// [bytes]
+    /// (bytes)
     fn length(&self) -> Result<u64, SweepError> {
         let metadata = self.file.metadata().map_err(|source| SweepError::Part { path: self.path.clone(), source })?;
         Ok(metadata.len())

@@ -25,16 +25,16 @@ use crate::{
 use serde::Serialize;
 use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
 
-/// How much finer than the finest measured grid the measured order is trusted [1]: two octaves, as many as it was
+/// How much finer than the finest measured grid the measured order is trusted (1): two octaves, as many as it was
 /// measured over. What takes more is not offered.
 pub const FARTHEST_EXTRAPOLATION: f64 = 4.0;
 
-/// Share of an error to stay below that the grid's spacing may have, as the measured order predicts it [1]; what the
+/// Share of an error to stay below that the grid's spacing may have, as the measured order predicts it (1); what the
 /// solver adds is independent of it and adds as squares, so that 0.6 is left for the solver and for the error of the
 /// order itself.
 const SPACING_SHARE: f64 = 0.8;
 
-/// Share of an error to stay below that the contact solver's tolerance may have [1]. See [`SPACING_SHARE`].
+/// Share of an error to stay below that the contact solver's tolerance may have (1). See [`SPACING_SHARE`].
 const SOLVER_SHARE: f64 = 0.05;
 
 /// Grid points of the pilot's finest grid, at most: some seconds of solving.
@@ -49,15 +49,15 @@ const CONTACTS: usize = 200;
 /// Seed of the random configurations; differs from that of the configurations at which a bake measures its error.
 const SEED: u64 = 0xbf58_476d_1ce4_e5b9;
 
-/// Tolerances of the solver that are tried, roughest first [1].
+/// Tolerances of the solver that are tried, roughest first (1).
 const TOLERANCES: [f64; 6] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 
 /// An error to stay below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aim {
-    /// Relative to the rms of the torque over the grid's region [1].
+    /// Relative to the rms of the torque over the grid's region (1).
     Relative(f64),
-    /// [N m]
+    /// (N m)
     Absolute(f64),
 }
 
@@ -86,13 +86,13 @@ impl FromStr for Aim {
 pub struct Trial {
     /// How it was interpolated.
     pub interpolation: &'static str,
-    /// Geometric mean of its spacings [rad or m].
+    /// Geometric mean of its spacings (rad or m).
     pub spacing: f64,
     /// Grid points.
     pub points: usize,
-    /// Rms error [N m].
+    /// Rms error (N m).
     pub rms: f64,
-    /// Worst error [N m].
+    /// Worst error (N m).
     pub worst: f64,
 }
 
@@ -101,9 +101,9 @@ pub struct Trial {
 pub struct Prospect {
     /// As the scene names it.
     pub interpolation: &'static str,
-    /// Measured order p of the error in the spacing [1].
+    /// Measured order p of the error in the spacing (1).
     pub order: f64,
-    /// How many times as fine as the pilot's finest grid it must be; less than one where a coarser one does [1].
+    /// How many times as fine as the pilot's finest grid it must be; less than one where a coarser one does (1).
     pub finer: f64,
     /// Grid points that it then has.
     pub points: f64,
@@ -112,11 +112,11 @@ pub struct Prospect {
 /// Result of a pilot.
 #[derive(Clone, Debug, Serialize)]
 pub struct Pilot {
-    /// Rms error to stay below [N m].
+    /// Rms error to stay below (N m).
     pub aim: f64,
-    /// The same over the rms torque [1].
+    /// The same over the rms torque (1).
     pub relative: f64,
-    /// Rms of the torque [N m].
+    /// Rms of the torque (N m).
     pub torque: f64,
     /// As in [`MeasuredError`](crate::dataset::MeasuredError::lever_arm) (m).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -129,26 +129,26 @@ pub struct Pilot {
     pub trials: Vec<Trial>,
     /// Forecasts, fewest points first; without interpolations whose error does not fall.
     pub prospects: Vec<Prospect>,
-    /// Tolerance of the solver that is good enough [1].
+    /// Tolerance of the solver that is good enough (1).
     pub tolerance: f64,
-    /// Time of the finest trial's points [s].
+    /// Time of the finest trial's points (s).
     pub seconds_per_point: f64,
-    /// The finest trial's dataset, over its points [bytes].
+    /// The finest trial's dataset, over its points (bytes).
     pub bytes_per_point: f64,
 }
 
 /// Cost of an error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Cost {
-    /// Rms error over the rms torque [1].
+    /// Rms error over the rms torque (1).
     pub relative: f64,
     /// Grid points.
     pub points: f64,
     /// See [`Prospect::finer`].
     pub finer: f64,
-    /// Solving them on this machine, at the pilot's rate [s].
+    /// Solving them on this machine, at the pilot's rate (s).
     pub seconds: f64,
-    /// The dataset [bytes].
+    /// The dataset (bytes).
     pub bytes: f64,
     /// Whether the grid is no finer than errors are extrapolated to.
     pub is_known: bool,
@@ -162,13 +162,13 @@ pub struct Choice {
     pub scene: Scene,
     /// How it is interpolated.
     pub interpolation: &'static str,
-    /// Geometric mean of the spacings [rad or m].
+    /// Geometric mean of the spacings (rad or m).
     pub spacing: f64,
     /// Grid points.
     pub points: usize,
-    /// Tolerance of the solver [1].
+    /// Tolerance of the solver (1).
     pub tolerance: f64,
-    /// Time that the bake takes, at the pilot's rate [s].
+    /// Time that the bake takes, at the pilot's rate (s).
     pub seconds: f64,
     /// Memory and disk.
     pub footprint: Footprint,

@@ -8,16 +8,16 @@ use crate::{JointVector, memory, scene::Scene};
 use serde::Serialize;
 use std::{sync::atomic::AtomicBool, time::Instant};
 
-/// Memory over that of the planning process and of the largest chunk [1]: allocators keep some of what was freed.
+/// Memory over that of the planning process and of the largest chunk (1): allocators keep some of what was freed.
 const MEMORY_MARGIN: f64 = 1.25;
 
-/// Points that are solved to know the time of one, at most [1].
+/// Points that are solved to know the time of one, at most (1).
 const SAMPLE: usize = 512;
 
-/// Points among them that are solved at once [1].
+/// Points among them that are solved at once (1).
 const PORTION: usize = 64;
 
-/// Time after which no more of them are solved [s].
+/// Time after which no more of them are solved (s).
 const LONGEST: f64 = 1.0;
 
 /// Expected cost of a shard.
@@ -29,9 +29,9 @@ pub struct ShardCost {
     pub points: usize,
     /// Those that are solved; the others are proven free.
     pub solved: usize,
-    /// Time from the start of the process to its end, as on this machine; absent where a GPU solves [s].
+    /// Time from the start of the process to its end, as on this machine; absent where a GPU solves (s).
     pub seconds: Option<f64>,
-    /// Its file [bytes].
+    /// Its file (bytes).
     pub bytes: usize,
 }
 
@@ -46,13 +46,13 @@ pub struct Plan {
     pub threads: usize,
     /// `cpu` or `gpu`.
     pub backend: &'static str,
-    /// Setting up, which each shard repeats: object, compliance, and proving points free [s].
+    /// Setting up, which each shard repeats: object, compliance, and proving points free (s).
     pub setup: f64,
     /// The sample; absent where the grid is too small.
     pub forecast: Option<Forecast>,
-    /// Memory of a process, shard or merge [bytes].
+    /// Memory of a process, shard or merge (bytes).
     pub memory: usize,
-    /// The dataset. Merging takes twice as much disk beside the shards, for a moment [bytes].
+    /// The dataset. Merging takes twice as much disk beside the shards, for a moment (bytes).
     pub dataset: usize,
     /// Shard by shard.
     pub shards: Vec<ShardCost>,
@@ -79,7 +79,7 @@ impl Plan {
         })
     }
 
-    /// `setup`: that time, and the time of each solved point where it is known [s].
+    /// `setup`: that time, and the time of each solved point where it is known (s).
     fn of(
         sweep: &mut Sweep<'_>,
         backend: &ChosenBackend<'_>,
@@ -117,20 +117,20 @@ impl Plan {
         }
     }
 
-    /// Total time of all shards, one after the other, where it is known [s].
+    /// Total time of all shards, one after the other, where it is known (s).
     #[must_use]
     pub fn seconds(&self) -> Option<f64> {
         self.shards.iter().map(|shard| shard.seconds).sum()
     }
 
-    /// Time of the longest shard, where it is known [s].
+    /// Time of the longest shard, where it is known (s).
     #[must_use]
     pub fn longest(&self) -> Option<f64> {
         self.shards.iter().filter_map(|shard| shard.seconds).max_by(f64::total_cmp)
     }
 }
 
-/// Time of each of the points `sample`, solved by `backend`; `None` where there are none [s].
+/// Time of each of the points `sample`, solved by `backend`; `None` where there are none (s).
 fn timed(sweep: &Sweep<'_>, backend: &mut ChosenBackend<'_>, sample: &[usize]) -> Result<Option<f64>, BakeError> {
     let (start, mut solved) = (Instant::now(), 0);
     for portion in sample.chunks(PORTION) {

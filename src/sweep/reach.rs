@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Configurations of one round; the first one is enough where contact is no rarity.
 const ROUND: usize = 1 << 15;
 
-/// Most rounds [1]: shallow contact of a few in ten thousand is still seen.
+/// Most rounds (1): shallow contact of a few in ten thousand is still seen.
 const ROUNDS: usize = 16;
 
 /// Shallow contacts that are asked for: those at the edges of a range lie within a hundredth of it.
@@ -30,34 +30,34 @@ const CONTACTS: usize = 4000;
 /// Seed of the random configurations.
 const SEED: u64 = 0xd1b5_4a32_d192_ed03;
 
-/// Depth up to which contact counts as shallow, over the body's size [1]: from about a fifth on a soft body has several
+/// Depth up to which contact counts as shallow, over the body's size (1): from about a fifth on a soft body has several
 /// equilibria, between which torque jumps on any grid.
 const SHALLOW: f64 = 0.2;
 
-/// By how much a range is widened on either side, over its width [1]: what lies between the outermost contacts that
+/// By how much a range is widened on either side, over its width (1): what lies between the outermost contacts that
 /// were met and the outermost ones there are.
 const MARGIN: f64 = 0.02;
 
-/// Parts of a joint's limits for which contact is listed separately [1].
+/// Parts of a joint's limits for which contact is listed separately (1).
 const PARTS: usize = 10;
 
-/// Points of the grid over the ranges from which a pilot begins [1]: more than the pilot's own.
+/// Points of the grid over the ranges from which a pilot begins (1): more than the pilot's own.
 const POINTS: f64 = 200_000.0;
 
-/// Lines of that grid along an axis, at most as a geometric mean [1]: with few joints there need not be so many points.
+/// Lines of that grid along an axis, at most as a geometric mean (1): with few joints there need not be so many points.
 const LINES: f64 = 64.0;
 
-/// Fewest steps along an axis [1]: interpolation takes differences over two.
+/// Fewest steps along an axis (1): interpolation takes differences over two.
 const FEWEST_STEPS: f64 = 2.0;
 
-/// How far the proxy moves along an axis at least, over the farthest [1]: a joint that hardly moves it still has its
+/// How far the proxy moves along an axis at least, over the farthest (1): a joint that hardly moves it still has its
 /// lines.
 const LEAST_WAY: f64 = 1e-3;
 
-/// To what ends of ranges are rounded, outwards [rad or m].
+/// To what ends of ranges are rounded, outwards (rad or m).
 const ROUNDED_TO: f64 = 1e-4;
 
-/// Depths for which the share of contact is listed, over the body's size [1].
+/// Depths for which the share of contact is listed, over the body's size (1).
 const DEPTHS: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.3, 0.5];
 
 /// Contact along one joint.
@@ -67,20 +67,20 @@ pub struct JointReach {
     pub name: String,
     /// `rad` or `m`.
     pub unit: &'static str,
-    /// The joint's limits [rad or m].
+    /// The joint's limits (rad or m).
     pub limits: [f64; 2],
-    /// Where shallow contact is [rad or m].
+    /// Where shallow contact is (rad or m).
     pub range: [f64; 2],
-    /// Shares of the configurations that are in contact, in each tenth of the limits [1].
+    /// Shares of the configurations that are in contact, in each tenth of the limits (1).
     pub contact: [f64; PARTS],
 }
 
 /// Contact up to a depth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DepthShare {
-    /// [m]
+    /// (m)
     pub depth: f64,
-    /// Share of all contact within the joint limits that is at most this deep [1].
+    /// Share of all contact within the joint limits that is at most this deep (1).
     pub share: f64,
 }
 
@@ -91,17 +91,17 @@ pub struct Reach {
     pub joints: Vec<JointReach>,
     /// Configurations measured.
     pub configurations: usize,
-    /// Share of them in contact [1].
+    /// Share of them in contact (1).
     pub contact: f64,
-    /// Share of those within the ranges that are in contact [1].
+    /// Share of those within the ranges that are in contact (1).
     pub contact_in_ranges: f64,
-    /// Volume of the ranges over that of the limits [1].
+    /// Volume of the ranges over that of the limits (1).
     pub volume: f64,
-    /// Least width of the body at rest [m].
+    /// Least width of the body at rest (m).
     pub body: f64,
-    /// Depth up to which contact counts as shallow [m].
+    /// Depth up to which contact counts as shallow (m).
     pub shallow: f64,
-    /// Greatest depth met within the ranges [m].
+    /// Greatest depth met within the ranges (m).
     pub deepest: f64,
     /// How deep contact is.
     pub depths: Vec<DepthShare>,
@@ -138,13 +138,13 @@ pub enum ReachError {
 #[derive(Clone, Copy)]
 struct Met {
     q: JointVector,
-    /// Signed distance between proxy and surface [m].
+    /// Signed distance between proxy and surface (m).
     gap: f64,
 }
 
 impl Reach {
     /// Measures `scene`, whose grid does not matter; `depth` is that of the contact that the ranges are to hold, by
-    /// default a fifth of the body's size [m].
+    /// default a fifth of the body's size (m).
     ///
     /// # Errors
     /// Any [`ReachError`].
@@ -252,7 +252,7 @@ impl Reach {
     }
 }
 
-/// Least extent of the object's surface along an axis of space [m].
+/// Least extent of the object's surface along an axis of space (m).
 fn size(object: &Object) -> f64 {
     let nodes = &object.rest[..object.surface_nodes];
     let bounds = nodes.iter().map(|node| (*node, *node)).reduce(|(low, high), (a, b)| (low.min(a), high.max(b)));

@@ -8,7 +8,7 @@ use crate::{
     scene::{Algorithm, ContactSpec, JointKind, LEVER_ARM, Scene, lever_arm},
 };
 
-/// Relative residual to which the reference of an accuracy study is solved [1]: three decades below the scenes' own
+/// Relative residual to which the reference of an accuracy study is solved (1): three decades below the scenes' own
 /// 1e-8, and still above what rounding leaves of a residual (about 1e-13).
 pub const REFERENCE_TOLERANCE: f64 = 1e-11;
 
@@ -18,19 +18,19 @@ const MOST_DRAWN: usize = 1 << 16;
 
 /// Random configurations and their torques.
 pub(crate) struct Reference {
-    /// Configurations [rad or m].
+    /// Configurations (rad or m).
     pub places: Vec<JointVector>,
     /// Torques there, converged.
     pub exact: Vec<JointVector>,
-    /// Energies there [J].
+    /// Energies there (J).
     energies: Vec<f64>,
     pub in_contact: usize,
     pub left_out: usize,
-    /// Mean number of the object's nodes with a contact force [1].
+    /// Mean number of the object's nodes with a contact force (1).
     pub mean_forces: f64,
-    /// rms of the torque [N m].
+    /// rms of the torque (N m).
     pub torque: f64,
-    /// rms of its own error [N m].
+    /// rms of its own error (N m).
     pub error: f64,
     levers: JointVector,
     /// As in [`MeasuredError`](crate::dataset::MeasuredError::lever_arm) (m).
@@ -147,7 +147,7 @@ impl Reference {
     }
 
     /// Mean of the squared distance of the torque that `answer` gives at each place from the exact one, and the
-    /// standard deviation of that mean over random places [N^2 m^2].
+    /// standard deviation of that mean over random places (N^2 m^2).
     pub fn mean_square(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
         let squares = self.squares(answer);
         let count = squares.len().max(1) as f64;
@@ -156,19 +156,19 @@ impl Reference {
         (mean, (variance / count).sqrt())
     }
 
-    /// Root mean square and greatest distance of the torque that `answer` gives at each place from the exact one [N m].
+    /// Root mean square and greatest distance of the torque that `answer` gives at each place from the exact one (N m).
     pub fn errors(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
         let squares = self.squares(answer);
         let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
         (mean.sqrt(), squares.into_iter().fold(0.0, f64::max).sqrt())
     }
 
-    /// Distance of the torque that `answer` gives at each place from the exact one [N m].
+    /// Distance of the torque that `answer` gives at each place from the exact one (N m).
     pub fn distances(&self, answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
         self.squares(answer).into_iter().map(f64::sqrt).collect()
     }
 
-    /// Squared distances of the torque that `answer` gives at each place from the exact one [N^2 m^2].
+    /// Squared distances of the torque that `answer` gives at each place from the exact one (N^2 m^2).
     fn squares(&self, mut answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
         let square = |(q, exact): (&JointVector, &JointVector)| {
             let answered = answer(q);

@@ -18,7 +18,7 @@ pub struct SweepReport {
     pub unconverged: usize,
     /// Points among them with more contacts than the solver has room for.
     pub overflowed: usize,
-    /// Greatest relative residual of a converged point [1].
+    /// Greatest relative residual of a converged point (1).
     pub max_residual: f64,
     /// Iterations of the points in contact.
     pub iterations: Iterations,
@@ -34,11 +34,11 @@ pub struct SweepReport {
     /// Error of the dataset; absent where it was not measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<MeasuredError>,
-    /// Wall time of this run [s].
+    /// Wall time of this run (s).
     pub seconds: f64,
-    /// Part of it spent on solving the points from rest [s].
+    /// Part of it spent on solving the points from rest (s).
     pub solving_seconds: f64,
-    /// Points solved by this run, over its wall time [1/s].
+    /// Points solved by this run, over its wall time (1/s).
     pub configurations_per_second: f64,
     /// `cpu` or `gpu`.
     pub backend: String,

@@ -12,14 +12,14 @@ use crate::random::Random;
 use serde::{Deserialize, Serialize};
 use std::{fmt, ops::Range, str::FromStr};
 
-/// Stretches of a shard where the grid has points enough [1]: the points in contact then differ from shard to shard by
+/// Stretches of a shard where the grid has points enough (1): the points in contact then differ from shard to shard by
 /// about a tenth.
 const STRETCHES: usize = 64;
 
-/// Fewest points of a stretch [1]: enough for the threads of a machine to share them.
+/// Fewest points of a stretch (1): enough for the threads of a machine to share them.
 const SHORTEST: usize = 64;
 
-/// Most shards of a sweep [1]: more than any cluster has tasks.
+/// Most shards of a sweep (1): more than any cluster has tasks.
 const MOST: usize = 1_000_000;
 
 /// Extension of a whole shard's file.

@@ -18,7 +18,7 @@ pub(crate) fn points(scene: &Scene) -> usize {
     scene.grid.axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul)
 }
 
-/// Geometric mean of the spacings of `scene` [rad or m].
+/// Geometric mean of the spacings of `scene` (rad or m).
 pub(crate) fn spacing_of(scene: &Scene) -> f64 {
     let axes = &scene.grid.axes;
     (axes.iter().map(|axis| axis.step.ln()).sum::<f64>() / axes.len().max(1) as f64).exp()

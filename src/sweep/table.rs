@@ -29,13 +29,13 @@ pub(super) struct Block<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct PointResult {
     pub status: Status,
-    /// tau [N m or N].
+    /// tau (N m or N).
     pub torque: JointVector,
-    /// U [J].
+    /// U (J).
     pub energy: f64,
-    /// [m]
+    /// (m)
     pub gap: f32,
-    /// Relative residual [1].
+    /// Relative residual (1).
     pub residual: f32,
     pub iterations: u32,
 }
@@ -122,7 +122,7 @@ impl<'a> Table<'a> {
         self.read(point, |block, row| block.result(row, self.width.joints))
     }
 
-    /// Forces on the object's nodes at a point, ascending by node [N].
+    /// Forces on the object's nodes at a point, ascending by node (N).
     pub fn forces(&self, point: usize) -> Vec<NodeForce> {
         self.read(point, |block, row| block.forces(row))
     }

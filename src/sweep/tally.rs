@@ -15,7 +15,7 @@ const SHARE: usize = 1 << 12;
 pub(super) struct Tally {
     pub points: usize,
     pub statuses: StatusCounts,
-    /// Greatest residual of a converged point [1].
+    /// Greatest residual of a converged point (1).
     pub max_residual: f32,
     /// Iterations, summed over the points in contact.
     pub iterations: u64,

@@ -19,7 +19,7 @@ use std::f64::consts::{PI, TAU};
 pub struct Lock {
     /// Its name.
     pub joint: String,
-    /// Where [rad or m].
+    /// Where (rad or m).
     pub value: f64,
 }
 
@@ -52,15 +52,15 @@ pub struct ArmJoint {
     pub name: String,
     /// Turning or sliding.
     pub kind: JointKind,
-    /// In the frame of the joint before, parallel to the world at q = 0 [m].
+    /// In the frame of the joint before, parallel to the world at q = 0 (m).
     pub origin: DVec3,
     /// Unit vector, parallel to the world at q = 0.
     pub axis: DVec3,
-    /// Least and greatest coordinate [rad or m].
+    /// Least and greatest coordinate (rad or m).
     pub limits: [f64; 2],
-    /// Greatest torque, where the file gives it [N m or N].
+    /// Greatest torque, where the file gives it (N m or N).
     pub effort: Option<f64>,
-    /// Greatest speed, where the file gives it [rad/s or m/s].
+    /// Greatest speed, where the file gives it (rad/s or m/s).
     pub velocity: Option<f64>,
     /// Links that move with it.
     pub links: Vec<String>,
@@ -194,7 +194,7 @@ fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, UrdfError> {
     Ok(way)
 }
 
-/// Least range of a joint [rad or m]: ten times the digits with which a scene shows its grid.
+/// Least range of a joint (rad or m): ten times the digits with which a scene shows its grid.
 const LEAST_RANGE: f64 = 1e-4;
 
 /// Most names in a message.

@@ -10,7 +10,7 @@ use std::path::Path;
 /// Most boxes, cylinders and spheres of a link that are written one by one.
 const MOST_FORMS: usize = 64;
 
-/// Least size of a form that is drawn [m]: the last digit of a length in the scene file. Nobody sees less.
+/// Least size of a form that is drawn (m): the last digit of a length in the scene file. Nobody sees less.
 const LEAST_SIZE: f64 = 1e-6;
 
 /// Cells along a surface's diagonal at first, and by how much they widen until it is small enough.
@@ -64,7 +64,7 @@ fn form(geometry: &Geometry) -> Option<LinkForm> {
     }
 }
 
-/// The least edge, radius or length of a form [m].
+/// The least edge, radius or length of a form (m).
 fn least_size(form: &LinkForm) -> f64 {
     match form {
         LinkForm::Box(size) => size.min_element(),
@@ -100,7 +100,7 @@ fn is_small(surface: &LinkSurface) -> bool {
     surface.nodes.len() + surface.triangles.len() <= MAX_SURFACE
 }
 
-/// Merges the nodes of each cell of `size` [m] to their mean, and drops triangles that become lines or are there twice.
+/// Merges the nodes of each cell of `size` (m) to their mean, and drops triangles that become lines or are there twice.
 fn clustered(surface: &LinkSurface, least: DVec3, size: f64) -> LinkSurface {
     let mut numbers: HashMap<IVec3, u32> = HashMap::new();
     let mut sums: Vec<(DVec3, f64)> = Vec::new();

@@ -26,7 +26,7 @@ impl Group {
         }));
     }
 
-    /// Returns the group in the frame with the same axes and its origin at `point` [m].
+    /// Returns the group in the frame with the same axes and its origin at `point` (m).
     pub fn about(mut self, point: DVec3) -> Self {
         self.shapes.iter_mut().for_each(|shape| shape.place.translation -= point);
         self.inertials.iter_mut().for_each(|own| own.centre -= point);

@@ -12,7 +12,7 @@ use std::ops::Range;
 pub struct Link {
     /// Each link's own.
     pub name: String,
-    /// Place in the file [B].
+    /// Place in the file (B).
     pub span: Range<usize>,
     /// Absent if the file gives none.
     pub inertial: Option<Inertial>,
@@ -20,18 +20,18 @@ pub struct Link {
     pub shapes: Vec<Placed>,
     /// Whether `shapes` are visual ones.
     pub is_visual: bool,
-    /// Places in the file of shapes of no size, which are left out [B].
+    /// Places in the file of shapes of no size, which are left out (B).
     pub empty: Vec<Range<usize>>,
 }
 
 /// Mass and inertia of a link.
 #[derive(Clone, Copy, Debug)]
 pub struct Inertial {
-    /// [kg]
+    /// (kg)
     pub mass: f64,
-    /// Centre of mass in the link's frame [m].
+    /// Centre of mass in the link's frame (m).
     pub centre: DVec3,
-    /// Inertia about the centre of mass, along the axes of the link's frame [kg m^2].
+    /// Inertia about the centre of mass, along the axes of the link's frame (kg m^2).
     pub inertia: DMat3,
 }
 
@@ -42,29 +42,29 @@ pub struct Placed {
     pub place: DAffine3,
     /// Its form.
     pub geometry: Geometry,
-    /// Place in the file [B].
+    /// Place in the file (B).
     pub span: Range<usize>,
 }
 
 /// Form of a shape, about its origin.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
-    /// Edges along the axes [m].
+    /// Edges along the axes (m).
     Box(DVec3),
     /// Along z.
     Cylinder {
-        /// [m]
+        /// (m)
         radius: f64,
-        /// [m]
+        /// (m)
         length: f64,
     },
-    /// By its radius [m].
+    /// By its radius (m).
     Sphere(f64),
     /// A mesh file.
     Mesh {
         /// As the file names it.
         file: String,
-        /// Factors on its coordinates [1].
+        /// Factors on its coordinates (1).
         scale: DVec3,
     },
 }

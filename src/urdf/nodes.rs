@@ -17,10 +17,10 @@ use std::path::Path;
 const CANDIDATES: f64 = 30.0;
 
 /// Nodes on an area of the square of the spacing, about, if dart throwing leaves no gap: 0.70 discs of that diameter
-/// [1].
+/// (1).
 const DENSITY: f64 = 0.7;
 
-/// Least spacing [m]: ten times the digits with which a scene shows its nodes.
+/// Least spacing (m): ten times the digits with which a scene shows its nodes.
 const LEAST_SPACING: f64 = 1e-4;
 
 /// Seed of the random candidates.
@@ -29,13 +29,13 @@ const SEED: u64 = 1;
 /// Contact nodes of a chain.
 #[derive(Clone, Debug)]
 pub struct ContactNodes {
-    /// Distance that no two of a link fall below [m].
+    /// Distance that no two of a link fall below (m).
     pub spacing: f64,
-    /// Positions in each joint's frame [m].
+    /// Positions in each joint's frame (m).
     pub of_joints: Vec<Vec<DVec3>>,
 }
 
-/// Puts contact nodes on the shapes of `arm` at a `spacing` [m]. `packages`: folder in which ROS packages are looked
+/// Puts contact nodes on the shapes of `arm` at a `spacing` (m). `packages`: folder in which ROS packages are looked
 /// for.
 ///
 /// # Errors

@@ -11,15 +11,15 @@ use crate::random::Random;
 use crate::scene::JointKind;
 use glam::{DMat3, DVec3};
 
-/// Radius of the ball over the arm's reach, and its range [1, m].
+/// Radius of the ball over the arm's reach, and its range (1, m).
 const RADIUS_PER_REACH: f64 = 0.1;
 const RADII: [f64; 2] = [0.01, 0.05];
 
-/// Gap between link and ball at the start, and how deep the motion presses, over the ball's radius [1].
+/// Gap between link and ball at the start, and how deep the motion presses, over the ball's radius (1).
 const GAP: f64 = 0.15;
 const DEPTH: f64 = 0.35;
 
-/// By how much the grid reaches beyond the motion at the link's end, over the ball's radius, and at most [1, rad].
+/// By how much the grid reaches beyond the motion at the link's end, over the ball's radius, and at most (1, rad).
 const MARGIN: f64 = 0.2;
 const MOST_MARGIN: f64 = 0.15;
 
@@ -32,27 +32,27 @@ const POSTURES: usize = 64;
 /// Steps of the power iteration for n: enough for eigenvalues that differ by a tenth.
 const ITERATIONS: usize = 100;
 
-/// Least margin [rad or m]: ten times the digits that are written.
+/// Least margin (rad or m): ten times the digits that are written.
 const LEAST_MARGIN: f64 = 1e-4;
 
-/// Shortest lever for which gains are given, over the longest [1]: a joint that hardly moves the node needs some
+/// Shortest lever for which gains are given, over the longest (1): a joint that hardly moves the node needs some
 /// stiffness, too.
 const SHORTEST_LEVER: f64 = 0.2;
 
-/// Range of the levers [m]: from a fingertip to the longest arm.
+/// Range of the levers (m): from a fingertip to the longest arm.
 const LEVERS: [f64; 2] = [0.01, 10.0];
 
 /// A ball, a grid and a motion.
 pub(super) struct Practice {
-    /// [m]
+    /// (m)
     pub centre: DVec3,
-    /// [m]
+    /// (m)
     pub radius: f64,
     /// Least and greatest coordinate of the grid, and its lines, for each joint.
     pub axes: Vec<([f64; 2], usize)>,
     /// Where the motion begins and where it presses most.
     pub motion: [JointVector; 2],
-    /// How far the node moves per joint coordinate, with which gains are scaled [m/rad, or 1].
+    /// How far the node moves per joint coordinate, with which gains are scaled (m/rad, or 1).
     pub levers: JointVector,
 }
 
@@ -63,7 +63,7 @@ struct Posture {
     direction: DVec3,
     centre: DVec3,
     radius: f64,
-    /// Distance from the ball to the nearest contact node [m].
+    /// Distance from the ball to the nearest contact node (m).
     clearance: f64,
 }
 

@@ -30,7 +30,7 @@ pub struct Robot {
 pub struct Joint {
     /// Each joint's own.
     pub name: String,
-    /// Place in the file [B].
+    /// Place in the file (B).
     pub span: Range<usize>,
     /// How it moves.
     pub kind: JointType,
@@ -44,11 +44,11 @@ pub struct Joint {
     pub axis: DVec3,
     /// Whether the file's axis was not a unit vector.
     pub was_scaled: bool,
-    /// Least and greatest coordinate; absent where the file gives none [rad or m].
+    /// Least and greatest coordinate; absent where the file gives none (rad or m).
     pub limits: Option<[f64; 2]>,
-    /// Greatest torque, where the file gives it [N m or N].
+    /// Greatest torque, where the file gives it (N m or N).
     pub effort: Option<f64>,
-    /// Greatest speed, where the file gives it [rad/s or m/s].
+    /// Greatest speed, where the file gives it (rad/s or m/s).
     pub velocity: Option<f64>,
     /// The joint that it follows, where it does.
     pub mimic: Option<String>,

@@ -5,10 +5,10 @@ use crate::{object, proxy};
 use glam::DVec3;
 use std::path::Path;
 
-/// Largest coordinate of a mesh [m].
+/// Largest coordinate of a mesh (m).
 const LARGEST: f64 = 1e6;
 
-/// Nodes [m] and triangles of a surface, which may be open.
+/// Nodes (m) and triangles of a surface, which may be open.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Surface {
     pub nodes: Vec<DVec3>,
@@ -64,12 +64,12 @@ impl Surface {
         })
     }
 
-    /// Returns corners of a triangle [m].
+    /// Returns corners of a triangle (m).
     pub fn corners(&self, triangle: [u32; 3]) -> [DVec3; 3] {
         triangle.map(|node| self.nodes[node as usize])
     }
 
-    /// Returns the area of each triangle [m^2].
+    /// Returns the area of each triangle (m^2).
     pub fn areas(&self) -> impl Iterator<Item = f64> {
         self.triangles.iter().map(|&triangle| {
             let [a, b, c] = self.corners(triangle);

@@ -14,13 +14,13 @@ use std::fmt::Write;
 /// Longest name of a joint in a scene, in characters.
 const MAX_NAME: usize = 40;
 
-/// Default reflected inertia of a joint's actuator, written where the robot has none [kg m^2, or kg].
+/// Default reflected inertia of a joint's actuator, written where the robot has none (kg m^2, or kg).
 const ROTOR: [f64; 2] = [1e-3, 0.05];
 
-/// Stiffness of the coupling at the contact node, from which the joints' gains follow [N/m].
+/// Stiffness of the coupling at the contact node, from which the joints' gains follow (N/m).
 const TIP_STIFFNESS: f64 = 800.0;
 
-/// Greatest force there [N].
+/// Greatest force there (N).
 const TIP_FORCE: f64 = 10.0;
 
 /// Returns the text of a scene with the arm, whose links are drawn as `shapes`, and a soft ball within its reach.

@@ -71,7 +71,7 @@ pub struct Viewer {
     pub(super) frame_rate: Option<f64>,
     /// Whether the steps from a scene to what is felt are shown.
     pub(super) shows_steps: bool,
-    /// Where proxy and device were when they last moved, and since when [s].
+    /// Where proxy and device were when they last moved, and since when (s).
     shown_at: (JointVector, JointVector),
     /// See `shown_at`.
     still: f64,
@@ -92,21 +92,21 @@ pub struct Rescue {
 /// Samples a pixel of the 3-D scene, for smooth edges.
 const SAMPLES: u32 = 4;
 
-/// Time after which what does not move is at rest [s]: the object's vibration has died down.
+/// Time after which what does not move is at rest (s): the object's vibration has died down.
 const SETTLED: f64 = 2.0;
 
-/// Motion of a joint between two frames that is none, over its grid step [1]: what a pixel does not show.
+/// Motion of a joint between two frames that is none, over its grid step (1): what a pixel does not show.
 const UNMOVED: f64 = 1e-3;
 
-/// Longest time between two frames of a moving window [s]; a longer one was at rest.
+/// Longest time between two frames of a moving window (s); a longer one was at rest.
 const LONGEST_FRAME: f64 = 1.0;
 
-/// Share of the latest frame in the frame rate that is shown [1].
+/// Share of the latest frame in the frame rate that is shown (1).
 const LATEST: f64 = 0.1;
 
 impl Viewer {
     /// A viewer that draws through `render`, whose device is that of `context`; files go to `folder`. Its windows want
-    /// to be [`dress`]ed.
+    /// to be `dress`ed.
     ///
     /// # Errors
     /// When the device refuses the drawing shaders.
@@ -297,7 +297,7 @@ impl Viewer {
         self.session.as_ref()?.feel.guide().names().iter().position(|known| *known == name)
     }
 
-    /// Time in the motion that leads, and its duration [s].
+    /// Time in the motion that leads, and its duration (s).
     #[must_use]
     pub fn time_in_motion(&self) -> Option<(f64, f64)> {
         self.session.as_ref()?.feel.guide().time()
@@ -316,7 +316,7 @@ impl Viewer {
         }
     }
 
-    /// Size of the contact torque now [N m]; none before the first tick.
+    /// Size of the contact torque now (N m); none before the first tick.
     #[must_use]
     pub fn contact_torque(&self) -> Option<f64> {
         Some(self.session.as_ref()?.history.last()?.contact_torque.norm())
@@ -340,7 +340,7 @@ impl Viewer {
             && self.still > SETTLED
     }
 
-    /// Lets `elapsed` [s] go by: the loop where it runs by steps, the object, and what is in the background.
+    /// Lets `elapsed` (s) go by: the loop where it runs by steps, the object, and what is in the background.
     pub fn advance(&mut self, elapsed: f64, egui: &egui::Context) {
         if self.pace == TickSource::Clock && elapsed > 0.0 && elapsed < LONGEST_FRAME {
             let rate = self.frame_rate.map_or(elapsed, |rate| (1.0 - LATEST) / rate + LATEST * elapsed).recip();

@@ -12,7 +12,7 @@ use crate::{
 };
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-/// Time in which the hand is led along each straight line of the way [s].
+/// Time in which the hand is led along each straight line of the way (s).
 pub const LEAD_IN: f64 = 0.8;
 
 /// Cost of a step to a point that is not free, in steps through free space: any detour is shorter.

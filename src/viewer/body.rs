@@ -20,9 +20,9 @@ pub struct Body {
     nodes: Nodes,
     /// Buffers from which the surface is drawn.
     pub surface: Surface,
-    /// n0 [m].
+    /// n0 (m).
     rest: Vec<Vec3>,
-    /// Largest displacement at rest [m] and contact force on a node [N] of the motions that can be played; of the whole
+    /// Largest displacement at rest (m) and contact force on a node (N) of the motions that can be played; of the whole
     /// dataset where these touch nothing.
     pub extremes: [f64; 2],
 }
@@ -34,9 +34,9 @@ pub struct Nodes {
     contact: Arc<ContactForces>,
     forces: Vec<DVec3>,
     smoothing: Option<Smoothing>,
-    /// Time between two frames of the object [s].
+    /// Time between two frames of the object (s).
     period: f64,
-    /// Time that the object lags behind [s].
+    /// Time that the object lags behind (s).
     owed: f64,
 }
 
@@ -64,13 +64,13 @@ impl Nodes {
         Ok(Some(Self { update, contact: Arc::clone(contact), forces, smoothing, period, owed: 0.0 }))
     }
 
-    /// Time between two frames [s].
+    /// Time between two frames (s).
     #[must_use]
     pub fn period(&self) -> f64 {
         self.period
     }
 
-    /// Lets `elapsed` [s] go by under the contact forces of `latest`.
+    /// Lets `elapsed` (s) go by under the contact forces of `latest`.
     ///
     /// # Errors
     /// When the device fails.
@@ -104,7 +104,7 @@ impl Body {
         Ok(Some(Self { nodes, surface, rest, extremes: extremes(loaded) }))
     }
 
-    /// Lets `elapsed` [s] go by under the contact forces of `latest`.
+    /// Lets `elapsed` (s) go by under the contact forces of `latest`.
     ///
     /// # Errors
     /// When the device fails.
@@ -112,13 +112,13 @@ impl Body {
         self.nodes.advance(latest, elapsed)
     }
 
-    /// Place of `node` at rest [m].
+    /// Place of `node` at rest (m).
     #[must_use]
     pub fn rest(&self, node: usize) -> Vec3 {
         self.rest[node]
     }
 
-    /// Nodes with a contact force, and that force [N].
+    /// Nodes with a contact force, and that force (N).
     pub fn contacts(&self) -> impl Iterator<Item = (usize, DVec3)> {
         self.nodes.forces.iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
     }

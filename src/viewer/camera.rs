@@ -8,45 +8,45 @@ use glam::{
 /// Where the eye is and what it looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Point in the middle of the picture [m].
+    /// Point in the middle of the picture (m).
     pub target: Vec3,
-    /// From the target to the eye [m].
+    /// From the target to the eye (m).
     pub distance: f32,
-    /// Direction from the target to the eye: angle about z from the x axis [rad].
+    /// Direction from the target to the eye: angle about z from the x axis (rad).
     pub azimuth: f32,
-    /// Height of that direction above the horizontal plane [rad].
+    /// Height of that direction above the horizontal plane (rad).
     pub elevation: f32,
 }
 
 /// A half-line into the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
-    /// The eye [m].
+    /// The eye (m).
     pub origin: Vec3,
     /// Unit vector.
     pub direction: Vec3,
 }
 
-/// Vertical angle of view [rad].
+/// Vertical angle of view (rad).
 const FIELD_OF_VIEW: f32 = 0.60;
-/// From where one looks at first: from the front, a little from the left and from above [rad].
+/// From where one looks at first: from the front, a little from the left and from above (rad).
 const AZIMUTH: f32 = -0.9;
 const ELEVATION: f32 = 0.42;
-/// Turn for a pointer's way of the picture's height [rad]: about half round.
+/// Turn for a pointer's way of the picture's height (rad): about half round.
 const TURN: f32 = 3.0;
-/// Nearest and farthest that is drawn, over the distance to the target [1]: there, depth in f32 (6e-8) over the nearest
+/// Nearest and farthest that is drawn, over the distance to the target (1): there, depth in f32 (6e-8) over the nearest
 /// resolves 6e-6 of the distance.
 const NEAR: f32 = 0.01;
 const FAR: f32 = 100.0;
-/// Nearest and farthest that one can zoom [m].
+/// Nearest and farthest that one can zoom (m).
 const DISTANCES: [f32; 2] = [1e-4, 1e4];
-/// Least width over height of a picture [1]: one of no width has no projection.
+/// Least width over height of a picture (1): one of no width has no projection.
 const LEAST_ASPECT: f32 = 1e-3;
-/// Least cosine of a ray to a plane's normal at which they meet [1]: f32 rounds it by 1e-7.
+/// Least cosine of a ray to a plane's normal at which they meet (1): f32 rounds it by 1e-7.
 const LEAST_SLOPE: f32 = 1e-6;
-/// Least extent of what is looked at [m].
+/// Least extent of what is looked at (m).
 const LEAST_RADIUS: f32 = 1e-6;
-/// The eye stays this far from straight above or below, where "up" has no meaning [rad].
+/// The eye stays this far from straight above or below, where "up" has no meaning (rad).
 const POLE_MARGIN: f32 = 0.02;
 
 impl Camera {
@@ -65,7 +65,7 @@ impl Camera {
         Vec3::new(cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation)
     }
 
-    /// The eye [m].
+    /// The eye (m).
     #[must_use]
     pub fn eye(&self) -> Vec3 {
         self.target + self.distance * self.backward()
@@ -85,7 +85,7 @@ impl Camera {
         perspective(FIELD_OF_VIEW, aspect.max(LEAST_ASPECT), near, far) * look_at_mat4(self.eye(), self.target, Vec3::Z)
     }
 
-    /// Height of the picture at the target's distance [m].
+    /// Height of the picture at the target's distance (m).
     #[must_use]
     pub fn height_at_target(&self) -> f32 {
         2.0 * self.distance * (0.5 * FIELD_OF_VIEW).tan()

@@ -21,18 +21,18 @@ use crate::{
 use eframe::egui::{self, Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
 use glam::{Vec2, Vec3};
 
-/// From where it is seen at first [rad]: a little more from the side than the 3-D scene, so that all three names show.
+/// From where it is seen at first (rad): a little more from the side than the 3-D scene, so that all three names show.
 const AZIMUTH: f32 = -0.95;
 const ELEVATION: f32 = 0.45;
 
 /// Radius of what is seen whole about the box from -1 to 1: its corners, at sqrt 3, and the names beside them.
 const SEEN: f32 = 2.1;
 
-/// Distance of names from the box's middle, over that of its faces [1].
+/// Distance of names from the box's middle, over that of its faces (1).
 const NAMES: f32 = 1.18;
 
-/// Radius of a dot at the greatest torque over the distance of neighbours: nearly touching [1]; within these limits
-/// [points]; and of the least torque over that of the greatest [1].
+/// Radius of a dot at the greatest torque over the distance of neighbours: nearly touching (1); within these limits
+/// (points); and of the least torque over that of the greatest (1).
 const DOT: f32 = 0.4;
 const DOTS: [f32; 2] = [1.0, 6.0];
 const LEAST_SHARE: f64 = 0.45;
@@ -40,7 +40,7 @@ const LEAST_SHARE: f64 = 0.45;
 /// Most dots that are shown: more overlap one another, and cost frames.
 const MOST: usize = 12_000;
 
-/// The colour bar, from the panel's upper right corner [points].
+/// The colour bar, from the panel's upper right corner (points).
 const BAR_AT: egui::Vec2 = vec2(-104.0, 22.0);
 const BAR_WIDTH: f32 = 86.0;
 
@@ -200,7 +200,7 @@ fn home() -> Camera {
     Camera { azimuth: AZIMUTH, elevation: ELEVATION, ..Camera::looking_at(Vec3::ZERO, SEEN) }
 }
 
-/// Size of the torque of a grid point [N m].
+/// Size of the torque of a grid point (N m).
 /// Returns where a configuration lies in the box from -1 to 1; missing joints in its middle, or on its floor.
 fn place(dataset: &Dataset, q: &JointVector) -> Vec3 {
     let mut place = Vec3::new(0.0, 0.0, if dataset.grid.joints() < 3 { -1.0 } else { 0.0 });

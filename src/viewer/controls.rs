@@ -36,8 +36,8 @@ pub struct Controls {
     prices: Prices,
 }
 
-/// Greatest stiffness of contact that can be typed [N/m], and the change for each point of the pointer's way
-/// [N/m/point].
+/// Greatest stiffness of contact that can be typed (N/m), and the change for each point of the pointer's way
+/// (N/m/point).
 const CONTACT_STIFFNESS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 const CONTACT_STIFFNESS_DRAG: f64 = 5.0;
 

@@ -67,23 +67,23 @@ const GAINS: [Gain; 4] = [
     },
 ];
 
-/// Greatest contact threshold that can be chosen [1]: an index reaches one only where all corners of a cell are in
+/// Greatest contact threshold that can be chosen (1): an index reaches one only where all corners of a cell are in
 /// contact.
 const GREATEST_THRESHOLD: f64 = 0.95;
 
-/// The slider's end over the larger of the bound and the scene's gain [1]: both lie well within it.
+/// The slider's end over the larger of the bound and the scene's gain (1): both lie well within it.
 const HEADROOM: f64 = 2.0;
 
 /// The slider's end where neither bound nor gain is above zero, in the gain's unit.
 const LEAST_END: f64 = 2e-3;
 
-/// Least value of a gain that must be positive, over the slider's end [1]: what the slider cannot tell from zero.
+/// Least value of a gain that must be positive, over the slider's end (1): what the slider cannot tell from zero.
 const LEAST_SHARE: f64 = 1e-6;
 
-/// Greatest value that can be typed, over the slider's end [1].
+/// Greatest value that can be typed, over the slider's end (1).
 const TYPED: f64 = 1e3;
 
-/// Change of a dragged number for each point of the pointer's way, over the slider's end [1/point].
+/// Change of a dragged number for each point of the pointer's way, over the slider's end (1/point).
 const DRAG: f64 = 0.005;
 
 /// Chooses the joint whose gains the sliders show; none for all.

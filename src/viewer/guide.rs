@@ -13,27 +13,27 @@ pub struct Guide {
     playing: Option<usize>,
     /// Whether the motion goes on.
     running: bool,
-    /// Since the motion began [s].
+    /// Since the motion began (s).
     time: f64,
-    /// Where the hand is led [rad or m].
+    /// Where the hand is led (rad or m).
     goal: JointVector,
-    /// Least and greatest coordinate of each joint [rad or m].
+    /// Least and greatest coordinate of each joint (rad or m).
     limits: Vec<[f64; 2]>,
     /// Whether a haptic device leads, and nobody here does.
     handed_over: bool,
-    /// Where the hand is at first [rad or m].
+    /// Where the hand is at first (rad or m).
     home: JointVector,
-    /// The way there, or to where the motion begins, and the time in it [s], while the hand takes it.
+    /// The way there, or to where the motion begins, and the time in it (s), while the hand takes it.
     approach: Option<(Motion, f64)>,
     /// The free space that this way leads through; absent: it is straight.
     space: Option<Arc<Dataset>>,
     /// Keys that are held; none while the window has not the keyboard.
     keys: Option<Keys>,
-    /// Since the window last said so [s].
+    /// Since the window last said so (s).
     silence: f64,
     /// The window that shows the hand, which rests while nothing moves; none where there is no window.
     window: Option<egui::Context>,
-    /// Since it was last asked to draw [s].
+    /// Since it was last asked to draw (s).
     unasked: f64,
 }
 
@@ -46,18 +46,18 @@ pub struct Keys {
     pub home: bool,
 }
 
-/// How far a key moves a joint in a second, as a share of its range [1/s]: all of it in four
+/// How far a key moves a joint in a second, as a share of its range (1/s): all of it in four
 /// seconds, slowly enough to press with care.
 const SPEED: f64 = 0.25;
 
-/// Longest time that a joint is moved for at once [s]: who stood still meanwhile must not throw the arm.
+/// Longest time that a joint is moved for at once (s): who stood still meanwhile must not throw the arm.
 const LONGEST: f64 = 0.1;
 
-/// Longest time that a window says nothing and still has the keyboard [s]: one that is hidden or hangs must not hold a
+/// Longest time that a window says nothing and still has the keyboard (s): one that is hidden or hangs must not hold a
 /// key down, while a slow rasteriser's draws a frame in a fifth of that.
 const LONGEST_SILENCE: f64 = 1.0;
 
-/// Least time between two frames that a moving hand asks for [s].
+/// Least time between two frames that a moving hand asks for (s).
 const BETWEEN_FRAMES: f64 = 1.0 / 60.0;
 
 impl Guide {
@@ -115,13 +115,13 @@ impl Guide {
         self.playing.is_some() && self.running
     }
 
-    /// Time in the motion that leads, and its duration [s].
+    /// Time in the motion that leads, and its duration (s).
     #[must_use]
     pub fn time(&self) -> Option<(f64, f64)> {
         self.playing.map(|number| (self.time, self.motions[number].1.duration()))
     }
 
-    /// Returns where the hand is led [rad or m].
+    /// Returns where the hand is led (rad or m).
     #[must_use]
     pub fn goal(&self) -> JointVector {
         self.goal
@@ -155,7 +155,7 @@ impl Guide {
         self.running = !self.running;
     }
 
-    /// Goes to `time` in the motion that leads [s].
+    /// Goes to `time` in the motion that leads (s).
     pub fn scrub(&mut self, time: f64) {
         (self.time, self.approach) = (time, None);
         self.advance(0.0);
@@ -179,7 +179,7 @@ impl Guide {
         self.window.get_or_insert_with(|| window.clone());
     }
 
-    /// The hand moves the first joints at `speeds`, from -1 to 1 each, for `elapsed` [s]; nobody takes the lead where
+    /// The hand moves the first joints at `speeds`, from -1 to 1 each, for `elapsed` (s); nobody takes the lead where
     /// all are 0.
     fn steer(&mut self, speeds: &[f64], elapsed: f64) {
         if speeds.iter().all(|speed| *speed == 0.0) {
@@ -198,7 +198,7 @@ impl Guide {
         self.take_to(self.home);
     }
 
-    /// Moves the hand by the keys that are held and the motion that plays, over `elapsed` [s]. Returns where it is led
+    /// Moves the hand by the keys that are held and the motion that plays, over `elapsed` (s). Returns where it is led
     /// now.
     pub fn follow(&mut self, elapsed: f64) -> JointVector {
         let before = self.goal;
@@ -218,7 +218,7 @@ impl Guide {
         goal
     }
 
-    /// `elapsed` [s] go by; answers with where the hand is led now.
+    /// `elapsed` (s) go by; answers with where the hand is led now.
     fn advance(&mut self, elapsed: f64) -> JointVector {
         let elapsed = if self.playing.is_none() || self.running { elapsed } else { 0.0 };
         if let Some((way, time)) = &mut self.approach {

@@ -21,9 +21,9 @@ pub struct History {
     ticks: VecDeque<Tick>,
     /// Number of the first tick kept, since the loop began.
     first: usize,
-    /// Nominal time between ticks [s].
+    /// Nominal time between ticks (s).
     period: f64,
-    /// When the loop began, since the first one did [s].
+    /// When the loop began, since the first one did (s).
     begun: f64,
     /// Whether no tick of this loop was seen yet.
     new: bool,
@@ -35,7 +35,7 @@ pub struct History {
 }
 
 impl History {
-    /// Nothing yet, of a loop with `period` [s] between ticks; none without memory.
+    /// Nothing yet, of a loop with `period` (s) between ticks; none without memory.
     #[must_use]
     pub fn new(period: f64) -> Option<Self> {
         let [cost, jitter, still] = [Durations::new()?, Durations::new()?, Durations::new()?];

@@ -13,7 +13,7 @@ use glam::{DAffine3, DVec3};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Corner {
-    /// In the frame that moves it [m].
+    /// In the frame that moves it (m).
     place: [f32; 3],
     normal: [f32; 3],
     /// Number of the frame: 0 for what stands still, then the links.

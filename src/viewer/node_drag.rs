@@ -14,9 +14,9 @@ use glam::{Vec2, Vec3};
 pub struct NodeDrag {
     /// Number of the proxy's node.
     pub node: usize,
-    /// Where the node was when it was gripped [m]: a point of the plane in which it is moved.
+    /// Where the node was when it was gripped (m): a point of the plane in which it is moved.
     anchor: Vec3,
-    /// From the pointer's place in that plane to the node [m].
+    /// From the pointer's place in that plane to the node (m).
     offset: Vec3,
 }
 

@@ -28,7 +28,7 @@ pub struct Picture {
     pub dark: bool,
     /// Name of the motion that is played; by default the press, where there is one.
     pub motion: Option<String>,
-    /// When the picture is taken, since the motion began [s].
+    /// When the picture is taken, since the motion began (s).
     pub time: f64,
 }
 
@@ -38,7 +38,7 @@ impl Default for Picture {
     }
 }
 
-/// Time between two frames of the picture's past [s].
+/// Time between two frames of the picture's past (s).
 const FRAME: f64 = 0.05;
 
 /// Frames of the last instant: egui lays out what it has measured in the frame before.

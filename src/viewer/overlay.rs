@@ -102,7 +102,7 @@ fn bar(rect: Rect) -> Rect {
     Rect::from_min_size(rect.right_bottom() + BAR_END - vec2(width, 0.0), vec2(width, COLOUR_BAR))
 }
 
-/// The largest of 1, 2, 5 times a power of ten that is not longer than `limit` [m].
+/// The largest of 1, 2, 5 times a power of ten that is not longer than `limit` (m).
 fn round_length(limit: f64) -> f64 {
     let decade = 10.0_f64.powf(limit.max(f64::MIN_POSITIVE).log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|digit| digit * decade).find(|length| *length <= limit).unwrap_or(decade)

@@ -4,7 +4,7 @@ use super::theme::{HAIRLINE, ROUNDING, SHADOW_BLUR, SHADOW_DROP};
 use crate::report::colour::{self, Colour};
 use eframe::egui::{self, Color32, CornerRadius, Shadow, Stroke, Theme, Visuals, style::HandleShape};
 
-/// Strength of lines that only help to read others, over their colour's own [1].
+/// Strength of lines that only help to read others, over their colour's own (1).
 pub const FAINT: f32 = 0.45;
 
 /// Colours of everything that egui does not draw itself.
@@ -96,7 +96,7 @@ pub fn grid(visuals: &Visuals) -> Color32 {
     visuals.weak_text_color().gamma_multiply(FAINT)
 }
 
-/// The mark of the current configuration, as radius [points] and colour: a ring with a rim on both sides shows on any
+/// The mark of the current configuration, as radius (points) and colour: a ring with a rim on both sides shows on any
 /// ground. It has the colour of failures where it stands at the grid's border for a configuration `outside`.
 #[must_use]
 pub fn ring(palette: &Palette, outside: bool) -> [(f32, Color32); 3] {

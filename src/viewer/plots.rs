@@ -44,13 +44,13 @@ pub struct Plots {
     pub tab: Tab,
     /// The ticks that are shown while paused.
     frozen: Option<History>,
-    /// Length of the time axis [s].
+    /// Length of the time axis (s).
     seconds: f64,
     /// Where files were written, or why not.
     note: Option<Result<String, String>>,
 }
 
-/// Lengths of the time axis that can be chosen [s]: a touch, a motion of the scene, all that is kept.
+/// Lengths of the time axis that can be chosen (s): a touch, a motion of the scene, all that is kept.
 const SPANS: [f64; 3] = [2.0, 6.0, 18.0];
 
 /// Actions of the pointer over frozen plots and the plane of C-space, for the window's help.
@@ -60,16 +60,16 @@ pub const HELP: [(&str, &str); 3] = [
     ("Double-click a plot", "see all of it"),
 ];
 
-/// Opacity of the lines that others are compared with [1].
+/// Opacity of the lines that others are compared with (1).
 const BEHIND: f32 = 0.6;
 
-/// Jitter and cost are shown from this decade to that one [log10 us]: from what clocks resolve to ten periods.
+/// Jitter and cost are shown from this decade to that one (log10 us): from what clocks resolve to ten periods.
 const DECADES: [f64; 2] = [-1.0, 4.0];
 
-/// Width of a histogram's bar over that of its bin [1].
+/// Width of a histogram's bar over that of its bin (1).
 const BAR: f64 = 0.94;
 
-/// Space above and below a line over the height of its plot [1].
+/// Space above and below a line over the height of its plot (1).
 const AROUND: f32 = 0.08;
 
 /// Points of a line: about one a pixel.
@@ -406,7 +406,7 @@ fn timing(ui: &mut Ui, history: &History) {
     });
 }
 
-/// Shares of `durations` in words [us]; none where there are none.
+/// Shares of `durations` in words (us); none where there are none.
 fn shares(durations: &Durations) -> Option<String> {
     let Percentiles { count, p50, p99, p999, max, .. } = durations.percentiles();
     let [p50, p99, p999, max] = [p50, p99, p999, max].map(number);

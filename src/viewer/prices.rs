@@ -31,7 +31,7 @@ pub enum Price {
     Unknown,
 }
 
-/// A time, or a difference of two, as it was found again and again [us].
+/// A time, or a difference of two, as it was found again and again (us).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     median: f64,
@@ -43,7 +43,7 @@ pub struct Estimate {
 /// once in 64.
 const REPEATS: usize = 7;
 
-/// Time from which on it is shown without decimals [us].
+/// Time from which on it is shown without decimals (us).
 const WHOLE: f64 = 10.0;
 
 impl Estimate {
@@ -52,19 +52,19 @@ impl Estimate {
         Self { median: found[REPEATS / 2], least: found[0], greatest: found[REPEATS - 1] }
     }
 
-    /// Upper bound of a cost too small to be measured [us]; absent where it was measured.
+    /// Upper bound of a cost too small to be measured (us); absent where it was measured.
     fn noise(self) -> Option<f64> {
         (self.least <= 0.0 && self.greatest >= 0.0).then(|| self.greatest.max(-self.least))
     }
 
-    /// Half the spread [us].
+    /// Half the spread (us).
     fn spread(self) -> f64 {
         0.5 * (self.greatest - self.least)
     }
 }
 
 impl Price {
-    /// Returns the price of something whole [us]; none if it does not work.
+    /// Returns the price of something whole (us); none if it does not work.
     #[must_use]
     pub fn cost(self) -> Option<String> {
         match self {
@@ -215,7 +215,7 @@ fn price(item: Item, loaded: &Loaded, context: &Arc<Context>, scene: &Tuning) ->
     Some(Estimate::of(std::array::from_fn(|repeat| with[repeat] - without[repeat])))
 }
 
-/// Costs of a tick with each of `gains` [us]; none where the loop cannot run.
+/// Costs of a tick with each of `gains` (us); none where the loop cannot run.
 fn tick_costs<const N: usize>(loaded: &Loaded, gains: [&HapticsSpec; N]) -> Option<[[f64; REPEATS]; N]> {
     let motion = match loaded.motions().into_iter().next() {
         Some((_, motion)) => motion,
@@ -244,7 +244,7 @@ fn tick_costs<const N: usize>(loaded: &Loaded, gains: [&HapticsSpec; N]) -> Opti
     })
 }
 
-/// Costs of a frame of the object with each of `effects` [us]; none where there is no object, or the device fails.
+/// Costs of a frame of the object with each of `effects` (us); none where there is no object, or the device fails.
 fn frame_costs<const N: usize>(
     loaded: &Loaded,
     context: &Arc<Context>,
@@ -267,7 +267,7 @@ fn frame_costs<const N: usize>(
     })
 }
 
-/// Costs of `N` kinds of work, of which `work` does one in blocks and answers with the time of each [us]: the sum over
+/// Costs of `N` kinds of work, of which `work` does one in blocks and answers with the time of each (us): the sum over
 /// blocks, each the fastest of some rounds; and that again and again.
 fn in_turns<const N: usize>(mut work: impl FnMut(usize) -> Option<Vec<f64>>) -> Option<[[f64; REPEATS]; N]> {
     let mut costs = [[0.0; REPEATS]; N];

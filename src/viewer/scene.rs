@@ -58,7 +58,7 @@ pub struct SceneView {
     ghost: Pose,
     /// The parts that are shown.
     pub shown: Shown,
-    /// Extent of the scene [m].
+    /// Extent of the scene (m).
     extent: f32,
 }
 
@@ -71,13 +71,13 @@ const HELD_BALL: f32 = 2.0;
 const GHOST: f32 = 0.45;
 const ARROW: f32 = 0.55;
 
-/// Length of the arrow of the dataset's greatest force over the extent of the scene [1].
+/// Length of the arrow of the dataset's greatest force over the extent of the scene (1).
 const LONGEST_ARROW: f32 = 0.5;
 
-/// Radius of what is seen at first over the extent of the scene [1]: a little less than all, whose corners are empty.
+/// Radius of what is seen at first over the extent of the scene (1): a little less than all, whose corners are empty.
 const SEEN: f32 = 0.98;
 
-/// Extent of a scene with nothing in it [m].
+/// Extent of a scene with nothing in it (m).
 const NO_EXTENT: f32 = 0.1;
 
 impl SceneView {
@@ -164,7 +164,7 @@ impl SceneView {
         Ok(())
     }
 
-    /// Lets `elapsed` [s] go by with the loop at `latest`.
+    /// Lets `elapsed` (s) go by with the loop at `latest`.
     ///
     /// # Errors
     /// When the device fails.

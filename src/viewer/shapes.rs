@@ -7,7 +7,7 @@ use glam::Vec3;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Shape {
-    /// End [m] and its radius [m].
+    /// End (m) and its radius (m).
     tail: [f32; 4],
     head: [f32; 4],
     /// Gamma-encoded red, green, blue from 0 to 1, and how much of it takes light.
@@ -16,8 +16,8 @@ pub struct Shape {
     anchor: u32,
 }
 
-/// An arrow over the radius of its shaft [1]: length below which it is not seen for the ball at its tail; length and
-/// radius of its head. And the head's greatest share of the whole [1].
+/// An arrow over the radius of its shaft (1): length below which it is not seen for the ball at its tail; length and
+/// radius of its head. And the head's greatest share of the whole (1).
 const LEAST_ARROW: f32 = 2.0;
 const HEAD_LENGTH: f32 = 5.0;
 const HEAD_RADIUS: f32 = 2.2;

@@ -25,12 +25,12 @@ use eframe::egui::{
 };
 use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotImage, PlotPoint, Points};
 
-/// Length of the trail behind the configuration [s], and its points.
+/// Length of the trail behind the configuration (s), and its points.
 const TRAIL: f64 = 2.0;
 const TRAIL_POINTS: usize = 200;
 
 /// Width left for name and value beside a slider, and for the ends of the range beside a colour bar; least width of
-/// slider and bar [points].
+/// slider and bar (points).
 const NAMES_WIDTH: f32 = 150.0;
 const RANGE_WIDTH: f32 = 60.0;
 const LEAST_WIDTH: f32 = 40.0;
@@ -313,7 +313,7 @@ fn picture(dataset: &Dataset, key: &Key, map: ColourMap, palette: &Palette) -> C
 /// A colour bar from left to right; `by_root`: the map's own scale is that of a square root.
 pub fn gradient(painter: &Painter, rect: Rect, map: ColourMap, by_root: bool) {
     const STEPS: usize = 48;
-    /// Overlap of neighbours, so that no ground shows between them [points].
+    /// Overlap of neighbours, so that no ground shows between them (points).
     const SEAM: f32 = 0.6;
     let [low, high] = map.range();
     for step in 0..STEPS {

@@ -31,7 +31,7 @@ pub const HELP: [(&str, &str); 8] = [
     ("Double-click", "reset the view"),
 ];
 
-/// Zoom for each point that the wheel turns, as a logarithm [1/point]: a notch, some 50 points, brings the eye nearer
+/// Zoom for each point that the wheel turns, as a logarithm (1/point): a notch, some 50 points, brings the eye nearer
 /// by a tenth.
 const ZOOM_PER_POINT: f32 = 0.002;
 

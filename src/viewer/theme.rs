@@ -93,7 +93,7 @@ pub const LEAST_MOTION: f32 = 40.0;
 pub const PAUSE_WIDTH: f32 = 52.0;
 /// Width of the time in a motion, as words.
 pub const TIME_WIDTH: f32 = 66.0;
-/// Most of the bar's width that the name of what is open takes [1].
+/// Most of the bar's width that the name of what is open takes (1).
 pub const NAME_SHARE: f32 = 0.11;
 /// A button that is alone.
 pub const LONE_BUTTON: egui::Vec2 = vec2(90.0, 24.0);
@@ -106,9 +106,9 @@ pub const PROGRESS_HEIGHT: f32 = 18.0;
 
 // --- Panels ---
 
-/// The window as it is opened: width and height [points].
+/// The window as it is opened: width and height (points).
 pub const WINDOW: [f32; 2] = [1280.0, 800.0];
-/// How small the window can be made: width and height [points].
+/// How small the window can be made: width and height (points).
 pub const LEAST_WINDOW: [f32; 2] = [900.0, 560.0];
 /// Width of the window below which plots lie under all other panels.
 pub const NARROW: f32 = 1150.0;
@@ -116,7 +116,7 @@ pub const NARROW: f32 = 1150.0;
 pub const CONTROLS_WIDTH: f32 = 232.0;
 /// See [`CONTROLS_WIDTH`].
 pub const CONTROLS_RANGE: std::ops::RangeInclusive<f32> = 200.0..=360.0;
-/// Height of the plots and width of C-space: this share of the window [1], within these limits.
+/// Height of the plots and width of C-space: this share of the window (1), within these limits.
 pub const SIDE_SHARE: f32 = 0.27;
 /// See [`SIDE_SHARE`].
 pub const PLOTS_RANGE: [f32; 2] = [165.0, 320.0];
@@ -124,7 +124,7 @@ pub const PLOTS_RANGE: [f32; 2] = [165.0, 320.0];
 pub const SPACE_RANGE: [f32; 2] = [240.0, 420.0];
 /// Height from which on plane and cloud of C-space find room, one below the other.
 pub const ROOM_FOR_BOTH: f32 = 470.0;
-/// Share of it that the plane has then [1].
+/// Share of it that the plane has then (1).
 pub const PLANE_SHARE: f32 = 0.58;
 /// Height of what explains the heat map below it, two lines; least height of the map itself, with its axes.
 pub const KEY_HEIGHT: f32 = 52.0;
@@ -191,10 +191,10 @@ pub fn upward<'a>(label: &str) -> AxisHints<'a> {
 
 /// Marks on an axis up, at most about so many: what is read at a glance.
 const MARKS: f64 = 6.0;
-/// Least distance of two marks over the least distance of grid lines [1]: room for a line of small letters.
+/// Least distance of two marks over the least distance of grid lines (1): room for a line of small letters.
 const LEGIBLE: f64 = 2.0;
 
-/// Leads from each of the steps 1, 2, 5 and 10 to the one below it [1].
+/// Leads from each of the steps 1, 2, 5 and 10 to the one below it (1).
 const FINER: f64 = 0.39;
 
 /// Returns the marks of an axis up: 1, 2 or 5 times a power of ten apart, so that every range has several with their

@@ -25,10 +25,10 @@ pub struct Surface {
 /// Quantity that the surface's colour shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quantity {
-    /// Size of the displacement [m].
+    /// Size of the displacement (m).
     #[default]
     Displacement,
-    /// Size of the contact force on a node [N].
+    /// Size of the contact force on a node (N).
     Force,
 }
 
@@ -39,9 +39,9 @@ pub struct Look {
     pub background: [f32; 3],
     /// Quantity that the surface's colour shows.
     pub quantity: Quantity,
-    /// Displacement [m] or force [N] at the top of the colour map.
+    /// Displacement (m) or force (N) at the top of the colour map.
     pub colour_top: f32,
-    /// Width of the triangles' edges [pixels]; 0 for none.
+    /// Width of the triangles' edges (pixels); 0 for none.
     pub edge_width: f32,
 }
 
@@ -69,7 +69,7 @@ struct Targets {
     picture: wgpu::Texture,
 }
 
-/// Largest side of the picture [pixels]: what every device has.
+/// Largest side of the picture (pixels): what every device has.
 const LARGEST_SIDE: u32 = 8192;
 
 impl Surface {

@@ -20,10 +20,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Time between two frames where nothing but the loop moves [s]: 60 a second.
+/// Time between two frames where nothing but the loop moves (s): 60 a second.
 const FRAME: Duration = Duration::from_micros(16_667);
 
-/// Time between two frames of a window at rest [s]: pointer, keys, a hand that moves and background work ask for one at
+/// Time between two frames of a window at rest (s): pointer, keys, a hand that moves and background work ask for one at
 /// once, and what is left is a fault of the loop or a late tick.
 const AT_REST: Duration = Duration::from_secs(60);
 

@@ -277,7 +277,7 @@ fn facets(equilibrium: &Equilibrium) -> Vec<(u32, Vec<u32>)> {
     equilibrium.touches.iter().map(|touch| (touch.proxy_node, touched(touch))).collect()
 }
 
-/// Half the length of a stencil [rad or m].
+/// Half the length of a stencil (rad or m).
 const STENCIL: f64 = 2e-6;
 
 /// Equilibria at the ends of a stencil about `q` along one joint.

@@ -14,7 +14,7 @@ pub fn spec(shape: Shape, kind: SpringKind) -> ObjectSpec {
     ObjectSpec { shape, ..bodies::sphere_spec(Ball { springs: kind, ..PAPER }, SPHERE_CENTRE, 1.0, 1.0) }
 }
 
-/// Where the sphere of [`sphere`] lies [m].
+/// Where the sphere of [`sphere`] lies (m).
 pub const SPHERE_CENTRE: DVec3 = DVec3::new(0.16, 0.0, 0.0);
 
 /// The paper's sphere of 102 nodes, radius 50 mm.
@@ -27,7 +27,7 @@ pub fn object(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Object {
     bodies::object(nodes, triangles).unwrap()
 }
 
-/// The same object held at every node by springs of this stiffness [N/m].
+/// The same object held at every node by springs of this stiffness (N/m).
 pub fn grounded(object: &Object, stiffness: f64) -> Object {
     let mut spec = bodies::sphere_spec(PAPER, SPHERE_CENTRE, 1.0, 1.0);
     spec.ground.as_mut().unwrap().stiffness = stiffness;
@@ -47,7 +47,7 @@ pub fn octahedron() -> Object {
     object(nodes, triangles)
 }
 
-/// Nodes along x from `from` to `to` [m].
+/// Nodes along x from `from` to `to` (m).
 fn row(from: f64, to: f64, count: usize, radius: f64) -> Vec<ProxyNodeSpec> {
     (0..count)
         .map(|k| {
@@ -88,7 +88,7 @@ pub fn ball(from: DVec3, axis: DVec3, radius: f64) -> Chain {
     bodies::probe(from, axis, radius)
 }
 
-/// Contact springs Kc [N/m], and few iterations: what converges here does so soon.
+/// Contact springs Kc (N/m), and few iterations: what converges here does so soon.
 pub fn contact(algorithm: Algorithm, stiffness: f64) -> ContactSpec {
     ContactSpec { algorithm, max_iterations: 100, ..bodies::contact(stiffness) }
 }

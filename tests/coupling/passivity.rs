@@ -15,7 +15,7 @@ use haptize::{
 };
 use std::collections::BTreeMap;
 
-/// What the port has given beyond what it took, at most, in ten seconds in a hand that presses 10 mm deep [J].
+/// What the port has given beyond what it took, at most, in ten seconds in a hand that presses 10 mm deep (J).
 fn given_in_a_hand(setup: &Setup) -> f64 {
     let way = [(0.0, -0.005), (0.5, 0.01)].map(|(time, z)| Waypoint { time, q: JointVector::from_slice(&[0.0, z]) });
     let mut hand = SimulatedHand::new(&setup.scene.haptics, Motion::through(&way, 2).unwrap()).unwrap();

@@ -38,7 +38,7 @@ impl Columns {
         &self.0.iter().find(|(other, _)| other == name).unwrap_or_else(|| panic!("no column {name}")).1
     }
 
-    /// Sum of columns of energy, tick by tick [J].
+    /// Sum of columns of energy, tick by tick (J).
     fn sum(&self, names: &[&str]) -> Vec<f64> {
         let columns: Vec<&[f64]> = names.iter().map(|name| self.get(&format!("{name} [J]"))).collect();
         (0..columns[0].len()).map(|k| columns.iter().map(|column| column[k]).sum()).collect()

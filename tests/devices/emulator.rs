@@ -95,7 +95,7 @@ impl Line {
 pub trait Firmware: Send {
     /// Takes in bytes; answers with the reply to each command, for a device at `angles`.
     fn take(&mut self, bytes: &[u8], angles: &JointVector) -> Vec<Vec<u8>>;
-    /// Torque on the joints [N m].
+    /// Torque on the joints (N m).
     fn torque(&self) -> JointVector;
     /// The reply of another device.
     fn other(&self) -> Vec<u8>;

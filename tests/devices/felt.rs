@@ -13,7 +13,7 @@ use haptize::{
     scene::Waypoint,
 };
 
-/// Nominal time between ticks [s].
+/// Nominal time between ticks (s).
 pub const PERIOD: f64 = 1e-3;
 
 /// `joints` times the same number.

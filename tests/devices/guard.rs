@@ -16,7 +16,7 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-/// Maximum torque of the simulated devices [N m].
+/// Maximum torque of the simulated devices (N m).
 const MOST: f64 = 1.0;
 
 /// A device that shows what torque is on it, wherever it went.

@@ -14,7 +14,7 @@ use haptize::{
     },
 };
 
-/// Length of each session, unless HAPTIZE_SECONDS gives another [s].
+/// Length of each session, unless HAPTIZE_SECONDS gives another (s).
 const SECONDS: f64 = 0.25;
 
 /// Runs the loop with `device` against the clock and prints its row.

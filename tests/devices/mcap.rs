@@ -314,7 +314,7 @@ fn damaged_files_are_errors_with_the_remedy_and_never_panics() {
     assert!(text(&damaged, None).unwrap_err().to_string().contains("not an MCAP file"));
 }
 
-/// Greatest distance between the ways of a device whose hand went the same way twice [rad]: the hand's speed of 1 rad/s
+/// Greatest distance between the ways of a device whose hand went the same way twice (rad): the hand's speed of 1 rad/s
 /// at most over half of a tick, by which its recording is interpolated, is less.
 const SAME_WAY: f64 = 1e-4;
 

@@ -218,7 +218,7 @@ fn a_whole_plan_is_scanned_with_a_touch_by_the_command_line() {
     assert_eq!(gridized.status.code(), Some(0), "{}", String::from_utf8_lossy(&gridized.stderr));
 }
 
-/// How long a machine may go on holding up what is tried again [s]: virtual machines of one owner share processors.
+/// How long a machine may go on holding up what is tried again (s): virtual machines of one owner share processors.
 #[cfg(unix)]
 const LONGEST_UNREST: Duration = Duration::from_secs(120);
 

@@ -58,7 +58,7 @@ enum Thread {
     Library,
 }
 
-/// Scans `scene` with a device of so much torque [N m] that fails as `scripts` say; its rows.
+/// Scans `scene` with a device of so much torque (N m) that fails as `scripts` say; its rows.
 fn scan(scene: &ScanScene, most: f64, scripts: &[Script]) -> (Result<(), ScanError>, Vec<ScanRow>) {
     scan_by(Thread::Own, scene, most, scripts)
 }
@@ -186,7 +186,7 @@ fn a_library_s_thread_lets_go_where_the_scan_is_silent_and_when_it_is_over() {
     assert!(held.halt.is_none() && held.torque[0] < 0.01, "{held:?}");
 }
 
-/// Torque after a call without an order [N m].
+/// Torque after a call without an order (N m).
 fn device_torque(ticker: &mut haptize::device::Ticker, device: &mut haptize::device::Relayed) -> f64 {
     ticker.tick(PERIOD);
     device.held().torque[0]

@@ -13,7 +13,7 @@ use haptize::{
     },
 };
 
-/// Configuration of the 2DIY around which the tests move [rad].
+/// Configuration of the 2DIY around which the tests move (rad).
 fn middle() -> JointVector {
     JointVector::from_slice(&[168.25_f64.to_radians(), 12.5_f64.to_radians()])
 }

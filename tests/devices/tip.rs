@@ -35,7 +35,7 @@ pub fn arm() -> Chain {
     Chain { joints: vec![joint(0.0, DVec3::Z), joint(0.0, DVec3::Y), joint(0.15, DVec3::Y)], nodes: vec![tip] }
 }
 
-/// A Cartesian device of 100 g in a hand that goes through `way` in space [m].
+/// A Cartesian device of 100 g in a hand that goes through `way` in space (m).
 fn hardware(way: &[(f64, [f64; 3])]) -> Simulated<SimulatedHand> {
     let limits = Limits { effort: all(3, 10.0), watchdog: Watchdog::None };
     Simulated::new(hand(way), Coordinates::Tip, limits, Vec::new())

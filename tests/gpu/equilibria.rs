@@ -44,7 +44,7 @@ fn agreement(algorithm: Algorithm) -> f64 {
     if algorithm == Algorithm::Paper { 1e-4 } else { 100.0 * GPU_SETTLED_RESIDUAL }
 }
 
-/// Agreement of gaps [m]: coordinates of about 0.2 m rounded a few times by 6e-8.
+/// Agreement of gaps (m): coordinates of about 0.2 m rounded a few times by 6e-8.
 const GAP_AGREEMENT: f64 = 1e-7;
 
 /// What differs between the CPU's and the GPU's result by `algorithm` beyond what they owe each other, or `None`.
@@ -62,10 +62,10 @@ fn difference(algorithm: Algorithm, cpu: &Equilibrium, gpu: &Equilibrium) -> Opt
     (!(energy <= owed && torque <= owed)).then(|| format!("U {energy:.1e}, tau {torque:.1e}"))
 }
 
-/// Share by which f32 may miss an invariant that is recomputed in f64 [1].
+/// Share by which f32 may miss an invariant that is recomputed in f64 (1).
 const INVARIANT_AGREEMENT: f64 = 1e-4;
 
-/// What is rounded of a depth recomputed in f64 at the exact proxy position [m].
+/// What is rounded of a depth recomputed in f64 at the exact proxy position (m).
 const DEPTH_AGREEMENT: f64 = 1e-7;
 
 /// Which law a result of the energy form breaks, recomputed in f64 from its forces alone, or `None`.
@@ -261,7 +261,7 @@ fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     assert!(matches!(refusal, GpuError::TooManyNodes { .. }), "{refusal}");
 }
 
-/// Configurations whose gap at rest is `wanted` [m] by f64, each between one in contact and a free one next to it in
+/// Configurations whose gap at rest is `wanted` (m) by f64, each between one in contact and a free one next to it in
 /// `path`.
 fn grazing(cpu: &mut Solver, path: &[JointVector], wanted: f64) -> Vec<JointVector> {
     let mut over = |q: &JointVector| cpu.gap(q) - wanted;

@@ -39,7 +39,7 @@ fn relative(reference: &[DVec3], other: &[DVec3]) -> f64 {
     error / size
 }
 
-/// Stored and kinetic energy of the object [J].
+/// Stored and kinetic energy of the object (J).
 fn energy(object: &Object, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
     let mut force = vec![DVec3::ZERO; displacement.len()];
     object.stiffness.apply(displacement, &mut force);

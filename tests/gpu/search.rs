@@ -27,7 +27,7 @@ fn configurations(scene: &Scene, stride: usize) -> Vec<JointVector> {
     (11..points).step_by(stride).map(configuration).collect()
 }
 
-/// Agreement of energies, torques and tangents, relative to the greatest of all configurations [1]: both solve to 1e-8
+/// Agreement of energies, torques and tangents, relative to the greatest of all configurations (1): both solve to 1e-8
 /// and take the same steps, which differ by rounding.
 const AGREEMENT: f64 = 1e-9;
 

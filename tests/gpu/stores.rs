@@ -17,11 +17,11 @@ use haptize::{
 };
 use std::{path::Path, process::Command, time::Instant};
 
-/// Agreement of energies and torques at nodes, over their rms [1]: with f64 in shaders both backends solve to 1e-8 and
+/// Agreement of energies and torques at nodes, over their rms (1): with f64 in shaders both backends solve to 1e-8 and
 /// take the same steps, which differ by rounding.
 const AGREEMENT: f64 = 1e-9;
 
-/// Rounding of the product of two numbers of a record, which are f32, on either side [1].
+/// Rounding of the product of two numbers of a record, which are f32, on either side (1).
 const RECORD_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
 /// Fills both levels of a store, whole, and prints how fast.

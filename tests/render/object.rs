@@ -20,7 +20,7 @@ fn graphics_60() -> GraphicsSpec {
     GraphicsSpec { rate: 60.0, effects: GraphicsEffects::default() }
 }
 
-/// Kinetic and elastic energy of the object [J].
+/// Kinetic and elastic energy of the object (J).
 fn energy(object: &Object, motion: &ObjectMotion<'_>) -> f64 {
     let mut force = vec![DVec3::ZERO; object.rest.len()];
     object.stiffness.apply(motion.displacement(), &mut force);

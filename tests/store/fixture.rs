@@ -22,7 +22,7 @@ impl Random {
     }
 }
 
-/// Spacing of the base along `axis` [rad]: none is a power of two.
+/// Spacing of the base along `axis` (rad): none is a power of two.
 pub fn step(axis: usize) -> f64 {
     0.1 + 0.03 * axis as f64
 }

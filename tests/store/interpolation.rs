@@ -18,7 +18,7 @@ fn levels(joints: usize) -> u32 {
     [0, 5, 4, 3, 3, 2, 2][joints]
 }
 
-/// Rounding of sums of f32 numbers of order one, relative [1]: a few hundred of them.
+/// Rounding of sums of f32 numbers of order one, relative (1): a few hundred of them.
 const ROUNDING: f64 = 1e-5;
 
 /// Distance from a border at which both sides are looked at, in steps of the base.

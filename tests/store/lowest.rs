@@ -17,7 +17,7 @@ use std::sync::{Arc, atomic::AtomicBool};
 /// Contact with several equilibria.
 const SCENE: &str = include_str!("../scenes/deep_points.toml");
 
-/// Rms error that a store of the lowest equilibria keeps, over the rms force [1]: where two branches cross the lowest
+/// Rms error that a store of the lowest equilibria keeps, over the rms force (1): where two branches cross the lowest
 /// energy has a kink, at which the force of a cell errs by its jump. Those cells are few: 3.5 % were measured. With
 /// equilibria of different branches side by side the error was 141 %.
 const KEPT: f64 = 0.1;
@@ -63,7 +63,7 @@ impl World {
     }
 }
 
-/// Rms error of the force of `store` at the points of `exact` in contact, over the rms force [1].
+/// Rms error of the force of `store` at the points of `exact` in contact, over the rms force (1).
 fn error(store: &Store, exact: &Dataset) -> f64 {
     let (mut missed, mut whole) = (0.0, 0.0);
     for point in (0..exact.grid.points()).filter(|&point| exact.status(point) == Status::Contact) {

@@ -144,7 +144,7 @@ pub fn stopped_after(done: usize) -> Folder {
 }
 
 thread_local! {
-    /// Memory that this thread holds, and the most it held since it was asked [bytes].
+    /// Memory that this thread holds, and the most it held since it was asked (bytes).
     static HELD: Cell<[isize; 2]> = const { Cell::new([0; 2]) };
 }
 
@@ -173,7 +173,7 @@ unsafe impl GlobalAlloc for Counted {
 #[global_allocator]
 static ALLOCATOR: Counted = Counted;
 
-/// What `work` returns, and the most memory that it held on this thread [bytes].
+/// What `work` returns, and the most memory that it held on this thread (bytes).
 pub fn peak<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let [before, _] = HELD.get();
     HELD.set([before; 2]);

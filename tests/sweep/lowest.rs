@@ -65,7 +65,7 @@ impl World {
     }
 }
 
-/// Excess of the energy over what the trapezoidal rule predicts between neighbours, along all edges in contact [J].
+/// Excess of the energy over what the trapezoidal rule predicts between neighbours, along all edges in contact (J).
 fn mismatches(dataset: &Dataset) -> Vec<f64> {
     let (grid, energy) = (&dataset.grid, dataset.energy.as_ref().unwrap());
     let mut found = Vec::new();

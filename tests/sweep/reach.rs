@@ -27,7 +27,7 @@ limits = [-0.1, 0.1]
 nodes = [{ at = [0.06, 0, 0], radius = 0.01 }]
 "#;
 
-/// How far the polyhedron is inside of the sphere, and a range's margin beyond contact [m].
+/// How far the polyhedron is inside of the sphere, and a range's margin beyond contact (m).
 const SLACK: f64 = 0.004;
 
 fn reach(depth: f64) -> Result<Reach, ReachError> {

@@ -117,7 +117,7 @@ fn what_an_unfinished_bake_has_solved_is_not_thrown_away() {
     }
 }
 
-/// Lengths of the frames of a part [bytes].
+/// Lengths of the frames of a part (bytes).
 fn frames(part: &[u8]) -> Vec<usize> {
     let mut left = &part[part.iter().position(|&byte| byte == b'\n').unwrap() + 1..];
     let mut lengths = Vec::new();

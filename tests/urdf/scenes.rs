@@ -108,7 +108,7 @@ fn packages_are_found_above_the_file_or_where_the_user_says() {
     succeed(folder.path(), &arguments);
 }
 
-/// Greatest distance between a corner of a shape and a contact node that was put on it [m]: corners of meshes carry
+/// Greatest distance between a corner of a shape and a contact node that was put on it (m): corners of meshes carry
 /// nodes, five decimals of which stand in the scene, and a surface has 65,535 steps within its bounds of some
 /// centimetres.
 const ON_CORNER: f64 = 2e-5;

@@ -25,13 +25,13 @@ pub struct Deformation {
     surface: u64,
     /// How far its points have moved at most.
     pub bound: MotionBound,
-    /// Forces that displace it: where the rows of C begin at the nodes that carry them, and the forces [N].
+    /// Forces that displace it: where the rows of C begin at the nodes that carry them, and the forces (N).
     loads: Vec<(usize, [f64; 3])>,
     /// The surface's number when each node was displaced.
     displaced: Vec<u64>,
-    /// Displacement of the nodes that are displaced [m].
+    /// Displacement of the nodes that are displaced (m).
     displacement: Vec<DVec3>,
-    /// Their positions [m].
+    /// Their positions (m).
     pub positions: Vec<DVec3>,
     places: Vec<Place>,
     /// Facets that were formed last: neighbouring proxy nodes look at the same few.
@@ -67,7 +67,7 @@ impl Deformation {
         }
     }
 
-    /// Another surface, displaced by `forces` on `nodes`, three numbers a node [N], within `bound`.
+    /// Another surface, displaced by `forces` on `nodes`, three numbers a node (N), within `bound`.
     pub fn take(&mut self, model: &Model, nodes: &[u32], forces: &[f64], bound: MotionBound) {
         self.surface += 1;
         self.bound = bound;
@@ -80,7 +80,7 @@ impl Deformation {
         }));
     }
 
-    /// Displacement of a node; zero where the compliance does not cover it [m].
+    /// Displacement of a node; zero where the compliance does not cover it (m).
     pub fn displacement(&mut self, model: &Model, node: u32) -> DVec3 {
         self.displace(model, node);
         self.displacement[node as usize]
@@ -134,7 +134,7 @@ impl Deformation {
         model.surface.carriers(t).0.iter().for_each(|&node| self.displace(model, node));
     }
 
-    /// Facet `t` [m].
+    /// Facet `t` (m).
     pub fn facet(&mut self, model: &Model, t: u32) -> &Facet {
         let at = t as usize % KEPT;
         if self.formed[at].surface != self.surface || self.formed[at].triangle != t {
@@ -146,7 +146,7 @@ impl Deformation {
     }
 
     /// Calls `visit` with each facet of the surface whose flat triangle is nearer to `x` than the squared radius that
-    /// `visit` returned last; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among
+    /// `visit` returned last; `radius_squared` is the first (m^2). Some that are as near but for rounding may be among
     /// them.
     pub fn search(&mut self, model: &Model, x: DVec3, radius_squared: f64, mut visit: impl FnMut(u32, &Facet) -> f64) {
         let slack = model.surface.bounds.slack(x);

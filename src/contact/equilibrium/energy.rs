@@ -36,52 +36,52 @@ pub const RESIDUAL_FLOOR: f64 = 1e-12;
 /// below are judged by the model alone.
 pub const ENERGY_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Share of the predicted decrease that a step must achieve to be taken [1] (Conn, Gould & Toint 2000,
+/// Share of the predicted decrease that a step must achieve to be taken (1) (Conn, Gould & Toint 2000,
 /// section 6.1: any value in (0, 1/4); small, because the energy itself is cheap and only decrease matters).
 pub const ACCEPTED_SHARE: f64 = 1e-4;
 
-/// Below this share of the predicted decrease damping grows [1] (Conn, Gould & Toint, section 17.1).
+/// Below this share of the predicted decrease damping grows (1) (Conn, Gould & Toint, section 17.1).
 pub const POOR_SHARE: f64 = 0.25;
 
-/// Above this share damping fades [1] (same source).
+/// Above this share damping fades (1) (same source).
 pub const GOOD_SHARE: f64 = 0.75;
 
-/// Largest relative residual at which the inner conjugate gradients stop [1]; nearer the solution they stop at the
+/// Largest relative residual at which the inner conjugate gradients stop (1); nearer the solution they stop at the
 /// outer residual itself, which keeps Newton's convergence quadratic (Dembo, Eisenstat & Steihaug 1982).
 pub const INNER_TOLERANCE: f64 = 1e-2;
 
-/// Least relative residual the inner conjugate gradients are asked for [1]: eps times the about 1e3 by which rounding
+/// Least relative residual the inner conjugate gradients are asked for (1): eps times the about 1e3 by which rounding
 /// grows over some tens of iterations.
 pub const INNER_TOLERANCE_FLOOR: f64 = 1e-13;
 
 /// First contact stiffness of the energy form, in units of the stiffness of the object's softest node (one over the
-/// trace of its compliance) [1]: soft contact, as stiff as the object itself, converges within a few steps from
+/// trace of its compliance) (1): soft contact, as stiff as the object itself, converges within a few steps from
 /// anywhere.
 pub const CONTINUATION_START: f64 = 4.0;
 
-/// Growth of the contact stiffness from stage to stage [1]: measured on the 102-node sphere at Kc = 1e4 to 1e6 N/m, 3
+/// Growth of the contact stiffness from stage to stage (1): measured on the 102-node sphere at Kc = 1e4 to 1e6 N/m, 3
 /// converges as fast as 4 and 10 where contact is shallow and more often where it is deep.
 pub const CONTINUATION_FACTOR: f64 = 3.0;
 
-/// Relative residual at which a stage but the last is left [1]. The next stage's own first residual is
+/// Relative residual at which a stage but the last is left (1). The next stage's own first residual is
 /// 1 - 1 / [`CONTINUATION_FACTOR`]; but a stage left at 0.1 had not always found its facets, and of deep contact at
 /// Kc = 1e6 N/m 91 % converged, after 0.01 98 % in the same time.
 pub const STAGE_TOLERANCE: f64 = 0.01;
 
-/// Length of a refused step, relative to the greatest there can be, at which a stage but the last is left [1]: where a
+/// Length of a refused step, relative to the greatest there can be, at which a stage but the last is left (1): where a
 /// stage stalls, at a kink, the next has a different energy and mostly gets past it.
 pub const STALLED_LENGTH: f64 = 1e-5;
 
-/// Length of a refused step, relative to the greatest there can be, at which a configuration is given up [1]: the
+/// Length of a refused step, relative to the greatest there can be, at which a configuration is given up (1): the
 /// energy of a step scales with its length, so below 1e-12 nothing measurable can be gained any more.
 pub const GIVE_UP_LENGTH: f64 = 1e-12;
 
-/// Relative residual of the linear solve that looks for negative curvature at an equilibrium [1]. Its random load has a
+/// Relative residual of the linear solve that looks for negative curvature at an equilibrium (1). Its random load has a
 /// share of one over the root of the number of unknowns, a tenth or so, in a direction of negative curvature, which
 /// conjugate gradients meet before the residual is as small as this.
 pub const PROBE_TOLERANCE: f64 = 1e-2;
 
-/// First length of the step away from a saddle, over the length of the displacement there, in the energy norm [1]; it
+/// First length of the step away from a saddle, over the length of the displacement there, in the energy norm (1); it
 /// is halved until the energy falls by more than its rounding, at most [`NUDGE_HALVINGS`] times.
 pub const NUDGE_LENGTH: f64 = 0.1;
 
@@ -100,20 +100,20 @@ pub enum Geometry {
 /// One state of the search.
 #[derive(Default)]
 pub struct State {
-    /// Forces on the support [N].
+    /// Forces on the support (N).
     pub forces: Vec<f64>,
     /// Contacts at this displacement.
     pub contacts: Vec<Contact>,
-    /// E [J].
+    /// E (J).
     pub energy: f64,
-    /// Its elastic part [J].
+    /// Its elastic part (J).
     pub elastic: f64,
 }
 
 /// When a search ends.
 #[derive(Clone, Copy, Debug)]
 pub struct StoppingCriteria {
-    /// Relative residual at which it has converged [1].
+    /// Relative residual at which it has converged (1).
     pub tolerance: f64,
     /// Steps tried at most.
     pub iterations: u32,
@@ -126,7 +126,7 @@ pub struct SolverStats {
     pub converged: bool,
     /// Steps tried.
     pub iterations: u32,
-    /// Relative residual [1].
+    /// Relative residual (1).
     pub residual: f64,
 }
 
@@ -137,23 +137,23 @@ pub struct EnergySearch {
     trial: State,
     /// The object nodes that carry force.
     pub support: Support,
-    /// Contact stiffness of the current stage, and of the last [N/m].
+    /// Contact stiffness of the current stage, and of the last (N/m).
     kc: f64,
     last_kc: f64,
     slots: Vec<Slots>,
     contact_forces: Vec<f64>,
-    /// r = c - f [N], and C r [m].
+    /// r = c - f (N), and C r (m).
     residual: Vec<f64>,
     product: Vec<f64>,
-    /// |r| over |c| in the energy norm [1].
+    /// |r| over |c| in the energy norm (1).
     imbalance: f64,
-    /// Displacement of the support in the trial [m].
+    /// Displacement of the support in the trial (m).
     displacement: Vec<f64>,
     newton: Newton,
     damping: Damping,
     /// Rows of the frozen problem, with their depths at rest.
     frozen: Vec<Contact>,
-    /// E at the start of the last stage and after each step taken since [J].
+    /// E at the start of the last stage and after each step taken since (J).
     pub history: Vec<f64>,
 }
 
@@ -203,7 +203,7 @@ impl EnergySearch {
     }
 
     /// Searches from where `forces` on the object's nodes hold it, which should be near the minimum with contact
-    /// stiffness `kc` [N/m], for the configuration that `detection` has taken up.
+    /// stiffness `kc` (N/m), for the configuration that `detection` has taken up.
     pub fn solve_with_guess(
         &mut self,
         model: &Model,
@@ -330,7 +330,7 @@ impl EnergySearch {
         frozen_contacts(model, frozen, detection, &mut state.contacts);
     }
 
-    /// Displaces the surface by `forces` on the support, which store the energy `elastic` [J].
+    /// Displaces the surface by `forces` on the support, which store the energy `elastic` (J).
     fn displace(&self, model: &Model, detection: &mut Detection, forces: &[f64], elastic: f64) {
         detection.displace(model, self.support.nodes(), forces, model.motion_bound(elastic));
     }
@@ -477,7 +477,7 @@ impl EnergySearch {
         self.trial.energy = self.trial.elastic + contact_energy(contacts, self.kc);
     }
 
-    /// Returns the rounding error of E [J]: each depth is rounded by a few eps of the coordinates, E's part by lambda
+    /// Returns the rounding error of E (J): each depth is rounded by a few eps of the coordinates, E's part by lambda
     /// times that.
     fn energy_rounding(&self, nodes: &[DVec3]) -> f64 {
         let mut size = self.state.energy;
@@ -489,7 +489,7 @@ impl EnergySearch {
 }
 
 /// Sets the multipliers of `contacts` to the forces that `force` predicts for the rows `before`, by their place; zero
-/// for a proxy node that had no row. Both lists ascend by proxy node [N].
+/// for a proxy node that had no row. Both lists ascend by proxy node (N).
 fn predict_multipliers(contacts: &mut [Contact], before: &[Contact], force: impl Fn(usize) -> f64) {
     let mut k = 0;
     for contact in contacts {
@@ -501,7 +501,7 @@ fn predict_multipliers(contacts: &mut [Contact], before: &[Contact], force: impl
     }
 }
 
-/// Returns 1/2 kc sum_i share_i max(0, depth_i)^2 [J].
+/// Returns 1/2 kc sum_i share_i max(0, depth_i)^2 (J).
 #[must_use]
 pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
     let mut sum = 0.0;
@@ -517,7 +517,7 @@ fn frozen_contacts(model: &Model, rows: &[Contact], detection: &mut Detection, c
     contacts.extend(rows.iter().map(|row| Contact { depth: row.depth + linear_change(model, row, detection), ..*row }));
 }
 
-/// Returns by how much that displacement deepens a frozen row [m].
+/// Returns by how much that displacement deepens a frozen row (m).
 fn linear_change(model: &Model, row: &Contact, detection: &mut Detection) -> f64 {
     let mut sum = DVec3::ZERO;
     for (node, weight) in row.carriers.iter() {

@@ -26,36 +26,36 @@ use crate::contact::law::depth::Contact;
 use crate::contact::law::springs::{Springs, add_contact_hessian, stretched_and_bent};
 use crate::contact::linear::support::{Support, dot, root};
 
-/// Conjugate-gradient iterations of one step at most, per unknown [1]: exact arithmetic needs one per unknown,
+/// Conjugate-gradient iterations of one step at most, per unknown (1): exact arithmetic needs one per unknown,
 /// rounding at stiff contact, and passes for other touching contacts, a few times as many.
 pub const INNER_ITERATIONS_PER_UNKNOWN: usize = 4;
 
-/// Passes of conjugate gradients in one step at most, each for another set of touching contacts [1]: sets
+/// Passes of conjugate gradients in one step at most, each for another set of touching contacts (1): sets
 /// settle in two or three; more are cut off by a decrease that no longer grows.
 pub const MODEL_PASSES: usize = 6;
 
-/// Least damping of a Newton step that is not zero, in the object's own stiffness [1]: less changes a step by less than
+/// Least damping of a Newton step that is not zero, in the object's own stiffness (1): less changes a step by less than
 /// the tenth that its model is good for where damping is needed at all. With 0.01, 64 hard balls on 2,027 nodes
 /// converge all the same, in the same time.
 pub const LEAST_DAMPING: f64 = 0.1;
 
-/// Factor by which damping grows after the first step that E refuses, doubled with each that follows [1] (Nielsen
+/// Factor by which damping grows after the first step that E refuses, doubled with each that follows (1) (Nielsen
 /// 1999): five refusals in a row multiply it by a million, which is what rigid contact is stiffer than the object
 /// ([`RIGID_STIFFNESS`]).
 pub const DAMPING_GROWTH: f64 = 4.0;
 
-/// Factor by which damping fades after a step that kept most of its promise [1]: with 0.1 points in soft contact on
+/// Factor by which damping fades after a step that kept most of its promise (1): with 0.1 points in soft contact on
 /// 1,026 nodes take 10.1 steps instead of 9.1, and 64 hard balls on 2,027 nodes as long; with 0.5 the eight hardest of
 /// these took twice as long, without [`CURVATURE_MARGIN`].
 pub const DAMPING_DECAY: f64 = 0.25;
 
-/// Damping that is added to what a direction of negative curvature lacks, in the object's own stiffness [1]. Without,
+/// Damping that is added to what a direction of negative curvature lacks, in the object's own stiffness (1). Without,
 /// the model is nearly flat in that direction, and the step so long that neighbouring configurations end at different
 /// equilibria: of 2,300 with points deeper than half the object's radius 34 have one within 2e-6 rad, with 5 only 7; 10
 /// takes a third more iterations where contact is stiff.
 pub const CURVATURE_MARGIN: f64 = 5.0;
 
-/// Attempts to find a damping with which the model is convex [1]: it doubles at least from one to the next, so that the
+/// Attempts to find a damping with which the model is convex (1): it doubles at least from one to the next, so that the
 /// last is 1e9, a thousand times what rigid contact is stiffer than the object ([`RIGID_STIFFNESS`]).
 pub const DAMPING_ATTEMPTS: u32 = 30;
 
@@ -63,7 +63,7 @@ pub const DAMPING_ATTEMPTS: u32 = 30;
 /// (Nielsen 1999).
 #[derive(Clone, Copy, Debug)]
 pub struct Damping {
-    /// mu, zero or [`LEAST_DAMPING`] and more [1].
+    /// mu, zero or [`LEAST_DAMPING`] and more (1).
     pub multiple: f64,
     /// Factor by which the next refused step multiplies it.
     growth: f64,
@@ -97,29 +97,29 @@ impl Damping {
 /// Predicted effect of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Decrease of the energy by the model without damping; not a number where no damping was enough [J].
+    /// Decrease of the energy by the model without damping; not a number where no damping was enough (J).
     pub predicted: f64,
-    /// Length in the energy norm, sqrt(df . C df) [sqrt(J)].
+    /// Length in the energy norm, sqrt(df . C df) (sqrt(J)).
     pub length: f64,
-    /// The damping mu with which the model is convex [1].
+    /// The damping mu with which the model is convex (1).
     pub damping: f64,
 }
 
 /// Vectors on the support, reused from step to step.
 #[derive(Default)]
 pub struct Newton {
-    /// The step df [N].
+    /// The step df (N).
     pub force: Vec<f64>,
-    /// The force of each row after the step, to first order, over kc [m].
+    /// The force of each row after the step, to first order, over kc (m).
     pub forces_over_kc: Vec<f64>,
-    /// The step du = C df on the support [m].
+    /// The step du = C df on the support (m).
     displacement: Vec<f64>,
     /// The step of the pass before.
     previous_force: Vec<f64>,
     previous_displacement: Vec<f64>,
     /// Which contacts touch, in this pass.
     active: Vec<bool>,
-    /// Times K, what the object resists with: 1 + mu [1].
+    /// Times K, what the object resists with: 1 + mu (1).
     stiffening: f64,
     residual: Vec<f64>,
     /// C times the residual.
@@ -168,7 +168,7 @@ impl Newton {
     /// The displacement du on the support with which (K + B) du is the force `load` on the support to `tolerance`, B
     /// the Hessian of the contacts given to [`Newton::factorise`], and what it leaves of the load; `None` where K + B
     /// is found not to be positive definite, and then [`Newton::descent`] is a direction in which the energy curves
-    /// downwards [m].
+    /// downwards (m).
     pub fn respond(
         &mut self,
         support: &Support,
@@ -187,12 +187,12 @@ impl Newton {
         Some((&self.displacement, &self.residual))
     }
 
-    /// The search direction of the last solve, as a force, and its length in the energy norm [N, sqrt(J)].
+    /// The search direction of the last solve, as a force, and its length in the energy norm (N, sqrt(J)).
     pub fn descent(&self) -> (&[f64], f64) {
         (&self.direction_force, root(dot(&self.direction, &self.direction_force)))
     }
 
-    /// The least of the damped model, and by how much it is less than at the start [J]; or what damping lacks where it
+    /// The least of the damped model, and by how much it is less than at the start (J); or what damping lacks where it
     /// is not convex.
     fn minimise(
         &mut self,
@@ -304,7 +304,7 @@ impl Newton {
     }
 
     /// Notes the rows' forces after the step, to first order; returns m(0) - m(df), in
-    /// differences that do not cancel near the solution [J].
+    /// differences that do not cancel near the solution (J).
     fn model_decrease(&mut self, springs: Springs, residual: &[f64]) -> f64 {
         let own = 0.5 * self.stiffening * dot(&self.displacement, &self.force);
         let mut decrease = dot(&self.displacement, residual) - own;

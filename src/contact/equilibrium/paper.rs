@@ -31,13 +31,13 @@ use glam::DVec3;
 pub struct Tie {
     /// Number of the proxy node.
     pub proxy_node: u32,
-    /// Its position x_i, or its deepest point if it has a radius, relative to the model's centre [m].
+    /// Its position x_i, or its deepest point if it has a radius, relative to the model's centre (m).
     pub target: DVec3,
     /// Object nodes, ascending.
     pub nodes: [u32; 3],
     /// Their slots on the support.
     pub slots: [usize; 3],
-    /// f_j^i after step 3, zero where dropped [N].
+    /// f_j^i after step 3, zero where dropped (N).
     pub forces: [DVec3; 3],
 }
 
@@ -48,17 +48,17 @@ pub struct PaperIteration {
     previous_ties: Vec<Tie>,
     /// Tied object nodes A.
     pub support: Support,
-    /// Forces on A after step 4 [N].
+    /// Forces on A after step 4 (N).
     pub forces: Vec<f64>,
     previous_forces: Vec<f64>,
     /// The pass that later ones are compared with: a repetition is a cycle.
     marked_ties: Vec<Tie>,
     marked_forces: Vec<f64>,
-    /// Displacement of all surface nodes after step 4 [m].
+    /// Displacement of all surface nodes after step 4 (m).
     pub displacement: Vec<f64>,
     positions: Vec<DVec3>,
     contacts: Vec<Contact>,
-    /// Step 2: number of ties of each node of A, matrix [m/N], right-hand side [m], which becomes the forces [N].
+    /// Step 2: number of ties of each node of A, matrix (m/N), right-hand side (m), which becomes the forces (N).
     tie_counts: Vec<f64>,
     matrix: Vec<f64>,
     tied_forces: Vec<f64>,
@@ -206,7 +206,7 @@ impl PaperIteration {
     }
 
     /// Relative change of the forces (and so of n = n0 + C f) since the last pass, in the energy norm; one when S
-    /// changed [1].
+    /// changed (1).
     fn relative_change(&mut self) -> f64 {
         if !same_selection(&self.ties, &self.previous_ties) {
             return 1.0;

@@ -19,13 +19,13 @@ use crate::proxy::Pose;
 use crate::scene::JointKind;
 use glam::DVec3;
 
-/// Relative residual of the linear solves behind a tangent d tau/d q [1]: the tangent errs by its square, relative to
+/// Relative residual of the linear solves behind a tangent d tau/d q (1): the tangent errs by its square, relative to
 /// the response, below the 6e-8 to which f32 stores it.
 pub const RESPONSE_TOLERANCE: f64 = 1e-4;
 
 /// The tangent at the equilibrium that `springs` and `support` describe, multipliers being the forces of the contacts,
 /// with the proxy in `pose`; `None` where the equilibrium is no strict minimum, so that there is no derivative
-/// [N m/rad].
+/// (N m/rad).
 pub(super) fn tangent(
     model: &Model,
     pose: &Pose,
@@ -103,7 +103,7 @@ mod tests {
         nodes = [{ from = [0.01, -0.01, -0.02], to = [0.012, 0.01, -0.022], count = 4 }]
     "#;
 
-    /// Step of central differences of the torque [rad or m]: small beside the facets, large beside what the solver
+    /// Step of central differences of the torque (rad or m): small beside the facets, large beside what the solver
     /// leaves of 1e-11.
     const STEP: f64 = 1e-7;
 

@@ -20,16 +20,16 @@ const BLOCK_SIZE: usize = 3;
 pub struct Woodbury {
     /// Places of the touching rows in the list of contacts.
     taken: Vec<usize>,
-    /// C g_a on the support for each of them, filled up with zeros to whole blocks [m/N].
+    /// C g_a on the support for each of them, filled up with zeros to whole blocks (m/N).
     columns: Vec<f64>,
-    /// Column at each node of an isotropic object, along the row's normal [m/N].
+    /// Column at each node of an isotropic object, along the row's normal (m/N).
     scalars: Vec<f64>,
     order: usize,
-    /// 1 + mu [1].
+    /// 1 + mu (1).
     stiffening: f64,
     /// That of (1 + mu) W^-1 + G C G^T; see [`crate::contact::linear::cholesky`].
     factor: Vec<f64>,
-    /// y, filled up with zeros [N].
+    /// y, filled up with zeros (N).
     pushes: Vec<f64>,
 }
 

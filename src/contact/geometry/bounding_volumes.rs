@@ -9,7 +9,7 @@ use super::packet::{LANES, Packet, greatest};
 use crate::contact::linear::wide::{Kernel, widest};
 use glam::DVec3;
 
-/// Slack of squared lower bounds in culling, relative to the square of the scene's size [1]: a squared distance between
+/// Slack of squared lower bounds in culling, relative to the square of the scene's size (1): a squared distance between
 /// points of coordinates up to L is rounded by a few eps L^2 (eps = 2.2e-16); 64 eps covers bound and distance.
 pub const CULLING_SLACK: f64 = 64.0 * f64::EPSILON;
 
@@ -21,7 +21,7 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Between two corners [m].
+    /// Between two corners (m).
     #[must_use]
     pub fn new((low, high): (DVec3, DVec3)) -> Self {
         Self { low, high }
@@ -33,13 +33,13 @@ impl Volume {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Middle and radius of the ball around it [m].
+    /// Middle and radius of the ball around it (m).
     #[must_use]
     pub fn ball(&self) -> (DVec3, f64) {
         (self.low.midpoint(self.high), 0.5 * self.low.distance(self.high))
     }
 
-    /// Squared distance of `x`; zero inside [m^2].
+    /// Squared distance of `x`; zero inside (m^2).
     #[inline]
     #[must_use]
     pub fn distance_squared(&self, x: DVec3) -> f64 {
@@ -52,7 +52,7 @@ impl Volume {
     }
 }
 
-/// Up to eight boxes side by side: low and high corner, and of each the coordinates [m]; those beyond the last are
+/// Up to eight boxes side by side: low and high corner, and of each the coordinates (m); those beyond the last are
 /// nowhere.
 struct Branch {
     low: [[f64; LANES]; 3],
@@ -73,7 +73,7 @@ impl Branch {
     }
 }
 
-/// Squared distances of `x` to the boxes of a branch; zero inside them [m^2].
+/// Squared distances of `x` to the boxes of a branch; zero inside them (m^2).
 struct DistancesSquared<'b> {
     branch: &'b Branch,
     x: DVec3,
@@ -109,7 +109,7 @@ pub struct Leaf {
 }
 
 impl Leaf {
-    /// Its triangles that at rest are no farther from `x` than the squared radius `bound` [m^2].
+    /// Its triangles that at rest are no farther from `x` than the squared radius `bound` (m^2).
     pub fn near(&self, x: DVec3, bound: f64) -> impl Iterator<Item = u32> {
         let squares = self.packet.distances_squared(x);
         self.triangles.iter().copied().zip(squares).filter(move |(_, square)| *square <= bound).map(|(t, _)| t)
@@ -124,12 +124,12 @@ pub struct BoundingVolumes {
     volume: Option<Volume>,
     /// From left to right.
     pub leaves: Vec<Leaf>,
-    /// Slack of squared distances [m^2].
+    /// Slack of squared distances (m^2).
     slack: f64,
 }
 
 impl BoundingVolumes {
-    /// The tree over `triangles` with corners at `positions` [m].
+    /// The tree over `triangles` with corners at `positions` (m).
     #[must_use]
     pub fn new(positions: &[DVec3], triangles: &[[u32; 3]]) -> Self {
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
@@ -155,19 +155,19 @@ impl BoundingVolumes {
         self.leaves.iter().flat_map(|leaf| leaf.triangles.iter().copied())
     }
 
-    /// Squared distance of `x` to the box around the whole surface; zero inside it [m^2].
+    /// Squared distance of `x` to the box around the whole surface; zero inside it (m^2).
     #[must_use]
     pub fn distance_squared(&self, x: DVec3) -> f64 {
         self.volume.map_or(f64::MAX, |volume| volume.distance_squared(x))
     }
 
-    /// Middle and radius of the ball around the whole surface [m].
+    /// Middle and radius of the ball around the whole surface (m).
     #[must_use]
     pub fn ball(&self) -> (DVec3, f64) {
         self.volume.map_or((DVec3::ZERO, f64::INFINITY), |volume| volume.ball())
     }
 
-    /// Returns the margin [m^2] by which a squared lower bound must exceed a squared distance to rule a triangle out,
+    /// Returns the margin (m^2) by which a squared lower bound must exceed a squared distance to rule a triangle out,
     /// for a point `x`.
     #[must_use]
     pub fn slack(&self, x: DVec3) -> f64 {
@@ -175,7 +175,7 @@ impl BoundingVolumes {
     }
 
     /// Calls `visit` with the number of each leaf whose box is nearer to `x` than the squared radius that `visit`
-    /// returned last; `bound` is the first [m^2].
+    /// returned last; `bound` is the first (m^2).
     #[inline]
     pub fn walk(&self, x: DVec3, mut bound: f64, mut visit: impl FnMut(usize) -> f64) {
         if let Some(root) = self.branches.last() {
@@ -198,7 +198,7 @@ impl BoundingVolumes {
     }
 
     /// Calls `visit` with each triangle that at rest is nearer to `x` than the squared radius that `visit` returned
-    /// last; `radius_squared` is the first [m^2]. Some that are as near but for rounding may be among them.
+    /// last; `radius_squared` is the first (m^2). Some that are as near but for rounding may be among them.
     pub fn search(&self, x: DVec3, radius_squared: f64, mut visit: impl FnMut(u32) -> f64) {
         let slack = self.slack(x);
         let mut bound = radius_squared + slack;

@@ -40,7 +40,7 @@ pub struct ClosestPoint {
     pub feature: Feature,
 }
 
-/// Closest point of the triangle `corners` [m] to `x` [m].
+/// Closest point of the triangle `corners` (m) to `x` (m).
 #[inline]
 #[must_use]
 pub fn closest_point(x: DVec3, corners: [DVec3; 3]) -> ClosestPoint {
@@ -98,7 +98,7 @@ fn edge(k: usize, t: f64) -> ClosestPoint {
     ClosestPoint { weights, feature: Feature::Edge(k) }
 }
 
-/// The point with barycentric `weights` on the triangle `corners` [m].
+/// The point with barycentric `weights` on the triangle `corners` (m).
 #[must_use]
 pub fn point_at(corners: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]

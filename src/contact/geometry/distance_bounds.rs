@@ -34,7 +34,7 @@ const MOST_CUBES: usize = 1 << 17;
 /// The bound within one cube, in single precision to stay in cache, and rounded down.
 #[derive(Clone, Copy)]
 struct Cube {
-    /// The bound at the model's centre [m], and its gradient.
+    /// The bound at the model's centre (m), and its gradient.
     constant: f32,
     gradient: Vec3,
     /// Triangle closest to the middle.
@@ -43,9 +43,9 @@ struct Cube {
 
 /// The lattice.
 pub struct DistanceBounds {
-    /// Its low corner [m].
+    /// Its low corner (m).
     low: DVec3,
-    /// One over a cube's side [1/m].
+    /// One over a cube's side (1/m).
     inverse_side: f64,
     /// Cubes along each axis.
     counts: [usize; 3],
@@ -88,7 +88,7 @@ impl DistanceBounds {
         Self { low, inverse_side: side.recip(), counts, cubes: cubes.collect() }
     }
 
-    /// A lower bound of the signed distance of `x` to the surface [m], and a triangle near by; `None` where there are
+    /// A lower bound of the signed distance of `x` to the surface (m), and a triangle near by; `None` where there are
     /// no cubes.
     #[inline]
     #[must_use]

@@ -13,11 +13,11 @@ use glam::DVec3;
 /// or four reach rounding, and where the distance is not convex more do not help.
 pub const FACET_ITERATIONS: usize = 16;
 
-/// Step of barycentric weights at which the search for that point ends [1]: the next step would be about its square,
+/// Step of barycentric weights at which the search for that point ends (1): the next step would be about its square,
 /// far below the rounding of a weight.
 pub const FACET_STEP: f64 = 1e-8;
 
-/// A triangle of the contact surface [m].
+/// A triangle of the contact surface (m).
 #[derive(Clone, Copy, Debug)]
 pub struct Facet {
     /// Its corners, anticlockwise seen from outside.
@@ -70,7 +70,7 @@ impl Facet {
         }
     }
 
-    /// Returns its point at barycentric weights `w` [m].
+    /// Returns its point at barycentric weights `w` (m).
     #[inline]
     #[must_use]
     pub fn point(&self, w: [f64; 3]) -> DVec3 {
@@ -89,7 +89,7 @@ impl Facet {
         })
     }
 
-    /// Returns the angle between its two edges at corner k [rad].
+    /// Returns the angle between its two edges at corner k (rad).
     #[must_use]
     pub fn angle(&self, k: usize) -> f64 {
         let mut at = [0.0; 3];
@@ -99,7 +99,7 @@ impl Facet {
         left.cross(right).length().atan2(left.dot(right))
     }
 
-    /// Finds the point of it that is closest to `x`; none where a bent facet is farther than `within` [m].
+    /// Finds the point of it that is closest to `x`; none where a bent facet is farther than `within` (m).
     #[inline]
     #[must_use]
     pub fn closest(&self, x: DVec3, within: f64) -> Option<ClosestPoint> {

@@ -9,7 +9,7 @@ use glam::DVec3;
 /// The closest feature of the surface.
 #[derive(Clone, Copy)]
 pub struct Closest {
-    /// Squared distance [m^2].
+    /// Squared distance (m^2).
     pub distance_squared: f64,
     /// Triangle.
     pub triangle: u32,
@@ -26,15 +26,15 @@ impl Closest {
     }
 
     /// Squared distance within which flat triangles may have a facet that is as close, where facets stand off them by
-    /// at most `bulge` [m^2].
+    /// at most `bulge` (m^2).
     #[must_use]
     pub fn within(&self, bulge: f64) -> f64 {
         if bulge == 0.0 { self.distance_squared } else { (self.distance_squared.sqrt() + bulge).powi(2) }
     }
 
     /// Takes `facet`, number `t`, instead if it is nearer to `x`, or as near with a lower number; its closest point,
-    /// and the squared distance of that [m^2]. Nothing is done, and none returned, where it is farther than `within`
-    /// [m].
+    /// and the squared distance of that (m^2). Nothing is done, and none returned, where it is farther than `within`
+    /// (m).
     pub fn consider(&mut self, x: DVec3, facet: &Facet, t: u32, within: f64) -> Option<(ClosestPoint, f64)> {
         let point = facet.closest(x, within)?;
         let distance_squared = x.distance_squared(facet.point(point.weights));

@@ -18,7 +18,7 @@ pub fn corners(positions: &[DVec3], [a, b, c]: [u32; 3]) -> [DVec3; 3] {
     [positions[a as usize], positions[b as usize], positions[c as usize]]
 }
 
-/// Mean length of the triangles' edges [m].
+/// Mean length of the triangles' edges (m).
 #[must_use]
 pub fn mean_edge(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
     let around = |[a, b, c]: [DVec3; 3]| a.distance(b) + b.distance(c) + c.distance(a);
@@ -26,7 +26,7 @@ pub fn mean_edge(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
     sum / (3.0 * triangles.len() as f64)
 }
 
-/// Twice the area times the outward unit normal of a triangle [m^2].
+/// Twice the area times the outward unit normal of a triangle (m^2).
 #[must_use]
 pub fn area_vector(corners: [DVec3; 3]) -> DVec3 {
     (corners[1] - corners[0]).cross(corners[2] - corners[0])
@@ -77,7 +77,7 @@ pub fn vertex_normal(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Top
 
 /// Returns how often the surface winds around `x`: the solid angles of all triangles over 4 pi (Van Oosterom & Strackee
 /// 1983). One inside, zero outside; it changes nowhere but on the surface, also where deformation has folded that over
-/// itself [1].
+/// itself (1).
 #[cfg(test)]
 #[must_use]
 pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> f64 {
@@ -91,7 +91,7 @@ pub fn winding_number(positions: &[DVec3], triangles: &[[u32; 3]], x: DVec3) -> 
     sum / std::f64::consts::TAU
 }
 
-/// Angle of a triangle at its corner `node` [rad].
+/// Angle of a triangle at its corner `node` (rad).
 fn corner_angle(positions: &[DVec3], triangle: [u32; 3], node: u32) -> f64 {
     let k = triangle.iter().position(|&corner| corner == node).unwrap_or(0);
     let [a, b, c] = corners(positions, triangle);

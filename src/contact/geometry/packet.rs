@@ -14,12 +14,12 @@ pub const LANES: usize = 8;
 /// One number of each triangle.
 type Lanes = [f64; LANES];
 
-/// Eight triangles side by side: corners, and of each the coordinates [m].
+/// Eight triangles side by side: corners, and of each the coordinates (m).
 #[derive(Clone, Debug, Default)]
 pub struct Packet([[Lanes; 3]; 3]);
 
 impl Packet {
-    /// The triangles `nodes` with corners at `positions` [m].
+    /// The triangles `nodes` with corners at `positions` (m).
     pub fn set(&mut self, positions: &[DVec3], nodes: &[[u32; 3]; LANES]) {
         for (lane, nodes) in nodes.iter().enumerate() {
             for (corner, &node) in self.0.iter_mut().zip(nodes) {
@@ -31,7 +31,7 @@ impl Packet {
         }
     }
 
-    /// The box around them: its low and high corner [m].
+    /// The box around them: its low and high corner (m).
     #[must_use]
     pub fn bounds(&self) -> (DVec3, DVec3) {
         (self.extreme(least), self.extreme(greatest))
@@ -58,7 +58,7 @@ impl Packet {
         DVec3::from_array(extreme)
     }
 
-    /// Squared distances of `x` [m^2].
+    /// Squared distances of `x` (m^2).
     #[inline]
     #[must_use]
     pub fn distances_squared(&self, x: DVec3) -> Lanes {

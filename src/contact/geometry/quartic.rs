@@ -72,14 +72,14 @@ fn raise<const M: usize, const N: usize>(basis: &[f64; M], w: [f64; 3]) -> [f64;
     raised
 }
 
-/// The Bernstein polynomials of degree four at weights `w` [1].
+/// The Bernstein polynomials of degree four at weights `w` (1).
 #[inline]
 #[must_use]
 pub fn basis(w: [f64; 3]) -> [f64; CONTROLS] {
     raise(&cubics(w), w)
 }
 
-/// Their derivative at `w` along `d` [1].
+/// Their derivative at `w` along `d` (1).
 #[inline]
 #[must_use]
 pub fn basis_slopes(w: [f64; 3], d: [f64; 3]) -> [f64; CONTROLS] {
@@ -95,11 +95,11 @@ fn cubics(w: [f64; 3]) -> [f64; CUBICS] {
 /// A point of a surface and its derivatives there.
 #[derive(Clone, Copy, Debug)]
 pub struct Jet {
-    /// The point [m].
+    /// The point (m).
     pub point: DVec3,
-    /// Its derivative by each weight, the others held [m].
+    /// Its derivative by each weight, the others held (m).
     slopes: [DVec3; LINES],
-    /// Its second derivatives by weights 00, 01, 02, 11, 12 and 22 [m].
+    /// Its second derivatives by weights 00, 01, 02, 11, 12 and 22 (m).
     bends: [DVec3; QUADRATICS],
 }
 
@@ -123,14 +123,14 @@ impl Jet {
         Self { point, slopes: *corners, bends: [DVec3::ZERO; QUADRATICS] }
     }
 
-    /// The derivative along `d` [m].
+    /// The derivative along `d` (m).
     #[inline]
     #[must_use]
     pub fn tangent(&self, d: [f64; 3]) -> DVec3 {
         self.slopes[0] * d[0] + self.slopes[1] * d[1] + self.slopes[2] * d[2]
     }
 
-    /// The second derivative along `d` and `e` [m].
+    /// The second derivative along `d` and `e` (m).
     #[inline]
     #[must_use]
     pub fn bend(&self, d: [f64; 3], e: [f64; 3]) -> DVec3 {

@@ -16,12 +16,12 @@ use glam::DVec3;
 /// Contact is with the triangles themselves, or with the smooth surface that they span. Searches go through the flat
 /// triangles; a smooth facet is nowhere farther from its triangle than the bulge.
 pub struct RestSurface<'a> {
-    /// Middle of the surface's box [m]. All contact geometry is relative to it, so that an object far from the world's
+    /// Middle of the surface's box (m). All contact geometry is relative to it, so that an object far from the world's
     /// origin loses no digits.
     pub centre: DVec3,
-    /// Distance of the farthest node from the centre [m].
+    /// Distance of the farthest node from the centre (m).
     pub extent: f64,
-    /// Positions of the nodes, relative to the centre [m].
+    /// Positions of the nodes, relative to the centre (m).
     pub positions: Vec<DVec3>,
     /// Nodes of each triangle, anticlockwise seen from outside.
     pub triangles: &'a [[u32; 3]],
@@ -33,9 +33,9 @@ pub struct RestSurface<'a> {
     distance_bounds: DistanceBounds,
     /// The smooth surface, where contact is with that.
     pub smooth: Option<SmoothSurface>,
-    /// By how much its facets stand off the flat triangles at most; zero where there is none [m].
+    /// By how much its facets stand off the flat triangles at most; zero where there is none (m).
     pub bulge: f64,
-    /// Mean length of the edges [m].
+    /// Mean length of the edges (m).
     pub mean_edge: f64,
     /// Unit normals of the triangles.
     pub normals: Vec<DVec3>,
@@ -83,7 +83,7 @@ impl<'a> RestSurface<'a> {
         surface
     }
 
-    /// A lower bound of the signed distance of `x`, and a triangle near by, if one is known [m].
+    /// A lower bound of the signed distance of `x`, and a triangle near by, if one is known (m).
     #[inline]
     #[must_use]
     pub fn distance_bound(&self, x: DVec3) -> (f64, Option<u32>) {
@@ -105,7 +105,7 @@ impl<'a> RestSurface<'a> {
         }
     }
 
-    /// Facet `t` with nodes at `positions`, relative to the centre [m].
+    /// Facet `t` with nodes at `positions`, relative to the centre (m).
     #[inline]
     #[must_use]
     pub fn facet(&self, positions: &[DVec3], t: u32) -> Facet {
@@ -115,7 +115,7 @@ impl<'a> RestSurface<'a> {
         }
     }
 
-    /// Facet `t` at rest [m].
+    /// Facet `t` at rest (m).
     #[inline]
     #[must_use]
     pub fn facet_at_rest(&self, t: u32) -> Facet {
@@ -226,7 +226,7 @@ mod tests {
     }
 
     /// The error of the distance to a sphere near its surface, and the angle between normals on either side of an edge,
-    /// both rms [m, rad].
+    /// both rms (m, rad).
     fn errors(divisions: u32, felt: ContactSurface) -> (f64, f64) {
         let object = sphere(divisions);
         let surface = RestSurface::new(&object, felt);

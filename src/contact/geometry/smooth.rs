@@ -37,7 +37,7 @@ pub struct SmoothSurface {
     shapes: Vec<Shape>,
     /// The shape of each triangle.
     shape: Vec<u32>,
-    /// From each node to its point of the control net, at rest [m].
+    /// From each node to its point of the control net, at rest (m).
     offsets: Vec<DVec3>,
     /// The facets at rest.
     pub at_rest: Vec<Facet>,
@@ -93,7 +93,7 @@ impl Shape {
         Self { count, masks }
     }
 
-    /// The facet whose control net has these nodes [m].
+    /// The facet whose control net has these nodes (m).
     #[inline]
     #[must_use]
     pub fn facet(&self, at: impl Fn(usize) -> DVec3) -> Facet {
@@ -108,7 +108,7 @@ impl Shape {
         Facet::bent(net)
     }
 
-    /// The weight of node `j` in each control point [1].
+    /// The weight of node `j` in each control point (1).
     #[must_use]
     pub fn mask_of(&self, j: usize) -> [f64; CONTROLS] {
         let weight = |mask: &Vec<(u8, f64)>| {
@@ -118,7 +118,7 @@ impl Shape {
         self.masks.each_ref().map(weight)
     }
 
-    /// The weights of its nodes in its point at barycentric weights `w` [1].
+    /// The weights of its nodes in its point at barycentric weights `w` (1).
     #[inline]
     #[must_use]
     pub fn point_weights(&self, w: [f64; 3]) -> [f64; CARRIERS] {
@@ -178,7 +178,7 @@ fn beside(corner: usize, around: &[usize], towards: usize, end: usize) -> Vec<(u
 }
 
 impl SmoothSurface {
-    /// Prepares the smooth surface through the nodes of a closed mesh at `positions` [m].
+    /// Prepares the smooth surface through the nodes of a closed mesh at `positions` (m).
     #[must_use]
     pub fn new(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Topology) -> Self {
         let mut surface = Self {
@@ -227,7 +227,7 @@ impl SmoothSurface {
         &self.shapes[self.shape[t as usize] as usize]
     }
 
-    /// Facet `t` with nodes at `positions` [m].
+    /// Facet `t` with nodes at `positions` (m).
     #[inline]
     #[must_use]
     pub fn facet(&self, positions: &[DVec3], t: u32) -> Facet {
@@ -235,7 +235,7 @@ impl SmoothSurface {
         self.shape(t).facet(|j| positions[nodes[j] as usize] + self.offsets[nodes[j] as usize])
     }
 
-    /// From `node` to its point of the control net, at rest [m].
+    /// From `node` to its point of the control net, at rest (m).
     #[must_use]
     pub fn offset(&self, node: u32) -> DVec3 {
         self.offsets[node as usize]
@@ -254,7 +254,7 @@ impl SmoothSurface {
     }
 
     /// Returns by how much the facets at rest stand off the flat triangles of the mesh at most, whose nodes are at
-    /// `positions` [m].
+    /// `positions` (m).
     #[must_use]
     pub fn bulge(&self, positions: &[DVec3]) -> f64 {
         let farthest = |(t, facet): (usize, &Facet)| {
@@ -288,7 +288,7 @@ fn flat(corners: [DVec3; 3], at: [usize; 3]) -> DVec3 {
     (corners[0] * at[0] as f64 + corners[1] * at[1] as f64 + corners[2] * at[2] as f64) / 4.0
 }
 
-/// From each node to its point of the control net whose limit passes through the nodes at `positions` [m].
+/// From each node to its point of the control net whose limit passes through the nodes at `positions` (m).
 fn offsets(positions: &[DVec3], triangles: &[[u32; 3]], topology: &Topology) -> Vec<DVec3> {
     let neighbours: Vec<Vec<u32>> = (0..positions.len())
         .map(|node| {

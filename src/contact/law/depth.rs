@@ -23,7 +23,7 @@ use crate::contact::geometry::smooth::{CARRIERS, Shape};
 use glam::DVec3;
 use std::ops::Neg;
 
-/// Least distance of a proxy node to its closest edge or vertex that curvature is divided by [m]: below a nanometre the
+/// Least distance of a proxy node to its closest edge or vertex that curvature is divided by (m): below a nanometre the
 /// direction between the two is rounding (coordinates of 0.1 m carry 1e-17 m, a direction good to 1e-6 needs 1e-11 m).
 pub const MINIMUM_CURVATURE_RADIUS: f64 = 1e-11;
 
@@ -41,11 +41,11 @@ pub struct Contact {
     pub carriers: Carriers,
     /// Unit direction N in which the surface pushes the proxy node.
     pub normal: DVec3,
-    /// r + s, positive in contact [m].
+    /// r + s, positive in contact (m).
     pub depth: f64,
-    /// Stiffness of the proxy node's spring over that of [`crate::contact::Model::kc`] [1].
+    /// Stiffness of the proxy node's spring over that of [`crate::contact::Model::kc`] (1).
     pub share: f64,
-    /// Force lambda by which the curvature counts: the row's force at the solution [N].
+    /// Force lambda by which the curvature counts: the row's force at the solution (N).
     pub multiplier: f64,
     /// Second derivative of s.
     pub curvature: Curvature,
@@ -115,14 +115,14 @@ impl Carriers {
 /// How displacements of the object's nodes move a closest point and turn the surface there.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Variation {
-    /// dp [m].
+    /// dp (m).
     pub point: DVec3,
-    /// dT_a [m].
+    /// dT_a (m).
     pub tangents: [DVec3; 2],
 }
 
 impl Variation {
-    /// A displacement of all nodes alike [m].
+    /// A displacement of all nodes alike (m).
     #[must_use]
     pub fn translation(point: DVec3) -> Self {
         Self { point, ..Self::default() }
@@ -149,17 +149,17 @@ impl Neg for Variation {
 /// How s bends under displacements of the object's nodes; see the file's head.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Curvature {
-    /// s [m].
+    /// s (m).
     pub distance: f64,
-    /// 1/s on edges and at vertices, zero on faces [1/m].
+    /// 1/s on edges and at vertices, zero on faces (1/m).
     pub inverse_distance: f64,
     /// Unit direction of the edge, else zero.
     pub along: DVec3,
-    /// T_a; zero for parameters that the feature has not [m].
+    /// T_a; zero for parameters that the feature has not (m).
     pub tangents: [DVec3; 2],
-    /// I^-1 B H^-1: its entries 00, 01 and 11 [1/m^3].
+    /// I^-1 B H^-1: its entries 00, 01 and 11 (1/m^3).
     pub bending: [f64; 3],
-    /// H^-1, likewise [1/m^2].
+    /// H^-1, likewise (1/m^2).
     pub turning: [f64; 3],
 }
 
@@ -283,14 +283,14 @@ impl Contact {
         self.depth > 0.0
     }
 
-    /// Its force over kc: max(0, depth) times the node's share [m].
+    /// Its force over kc: max(0, depth) times the node's share (m).
     #[inline]
     #[must_use]
     pub fn force_over_kc(&self) -> f64 {
         self.share * self.depth.max(0.0)
     }
 
-    /// Returns by how much displacements `v` of its nodes, by their place, move its closest point [m].
+    /// Returns by how much displacements `v` of its nodes, by their place, move its closest point (m).
     #[inline]
     #[must_use]
     pub fn moved(&self, v: impl Fn(usize) -> DVec3) -> DVec3 {
@@ -317,14 +317,14 @@ impl Contact {
         variation
     }
 
-    /// Returns by how much a variation brings the feature nearer, to first order [m].
+    /// Returns by how much a variation brings the feature nearer, to first order (m).
     #[inline]
     #[must_use]
     pub fn depth_change(&self, variation: &Variation) -> f64 {
         self.normal.dot(variation.point)
     }
 
-    /// Returns the reaction of a force `push` along the depth on the closest point: push N [N].
+    /// Returns the reaction of a force `push` along the depth on the closest point: push N (N).
     #[inline]
     #[must_use]
     pub fn spread(&self, push: f64) -> Variation {

@@ -14,13 +14,13 @@ pub struct Springs<'a> {
     pub contacts: &'a [Contact],
     /// Slots of each row's nodes.
     pub slots: &'a [Slots],
-    /// kc [N/m].
+    /// kc (N/m).
     pub kc: f64,
 }
 
 impl<'a> Springs<'a> {
     /// Returns the reaction with which row `k` resists the variation `v`: the Hessian of its energy, with its
-    /// multiplier as it is [N]. `None` if it is zero because the row is neither `active` nor bent.
+    /// multiplier as it is (N). `None` if it is zero because the row is neither `active` nor bent.
     #[must_use]
     pub fn resist(self, k: usize, active: bool, v: &Variation) -> Option<Variation> {
         let row = &self.contacts[k];
@@ -36,7 +36,7 @@ impl<'a> Springs<'a> {
         self.contacts[k].variation(|j| DVec3::from_array(nodes[slots[j] as usize]))
     }
 
-    /// Returns by how much the displacement `vector` on the support deepens row `k`, to first order [m].
+    /// Returns by how much the displacement `vector` on the support deepens row `k`, to first order (m).
     #[inline]
     #[must_use]
     pub fn depth_change(self, k: usize, vector: &[f64]) -> f64 {
@@ -55,7 +55,7 @@ impl<'a> Springs<'a> {
     }
 }
 
-/// The reaction of a row whose spring takes `push` more [N] under the variation `v`.
+/// The reaction of a row whose spring takes `push` more (N) under the variation `v`.
 pub fn stretched_and_bent(row: &Contact, push: f64, v: &Variation) -> Variation {
     let straight = row.spread(push);
     if row.multiplier == 0.0 {

@@ -13,7 +13,7 @@ pub struct Support {
     slots: Vec<u32>,
     /// Surface node of each slot.
     nodes: Vec<u32>,
-    /// C_AA, row-major, as many rows per node as C has [m/N].
+    /// C_AA, row-major, as many rows per node as C has (m/N).
     compliance: Vec<f64>,
     rows_per_node: usize,
     /// Nodes for which `compliance` was gathered.
@@ -92,7 +92,7 @@ impl Support {
         }
     }
 
-    /// C_AA, row-major, and its rows per node: 3, or 1 where each stands for all three coordinates [m/N].
+    /// C_AA, row-major, and its rows per node: 3, or 1 where each stands for all three coordinates (m/N).
     #[must_use]
     pub fn compliance(&self) -> (&[f64], usize) {
         (&self.compliance, self.rows_per_node)
@@ -114,8 +114,8 @@ impl Support {
     }
 
     /// Sets `displacement` to that of the support under a force of one newton along `direction`, shared among slots by
-    /// their weights [m]. An isotropic object, for which it returns true, moves along the direction everywhere, by the
-    /// `scalars` [m].
+    /// their weights (m). An isotropic object, for which it returns true, moves along the direction everywhere, by the
+    /// `scalars` (m).
     pub fn respond_along(
         &self,
         direction: DVec3,

@@ -17,7 +17,7 @@ use std::{
 };
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
-/// Room for the header of an array beside its data [bytes].
+/// Room for the header of an array beside its data (bytes).
 const ARRAY_HEADER: u64 = 1 << 16;
 
 pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {

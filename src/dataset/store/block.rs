@@ -8,9 +8,9 @@ use crate::{MAX_JOINTS, contact::Status};
 pub struct Nodes {
     /// Bit p says that the node at place p was solved.
     pub present: u64,
-    /// w, its gradient and mixed derivatives at each [sqrt(J), by rad or m]; see [`super::record`].
+    /// w, its gradient and mixed derivatives at each (sqrt(J), by rad or m); see [`super::record`].
     pub records: Vec<f32>,
-    /// Smallest signed distance between proxy and object at rest [m].
+    /// Smallest signed distance between proxy and object at rest (m).
     pub gap: Vec<f32>,
     /// [`Status`] as its number.
     pub status: Vec<u8>,
@@ -81,7 +81,7 @@ impl Block {
         if present >> place & 1 == 1 { self.surplus.get(rank * kinds..(rank + 1) * kinds) } else { None }
     }
 
-    /// Memory of the block [bytes].
+    /// Memory of the block (bytes).
     #[must_use]
     pub fn bytes(&self) -> usize {
         let Nodes { records, gap, status, .. } = &self.nodes;

@@ -7,7 +7,7 @@
 //! | `block_keys` | u64 | b | level and coordinates of each block (`space.rs`), ascending |
 //! | `block_nodes` | u64 | b | bit p: the block has the node at place p |
 //! | `node_records` | f32 | n, 1 + d (d + 1) / 2 | numbers of each node, by block and place (`record.rs`) |
-//! | `node_gap` | f32 | n | smallest signed distance at rest [m] |
+//! | `node_gap` | f32 | n | smallest signed distance at rest (m) |
 //! | `node_status` | u8 | n | [`crate::contact::Status`] |
 //! | `surface_nodes`, `surface_triangles`, ... | | | the object's geometry, as in a dataset's file |
 //!
@@ -50,7 +50,7 @@ struct Shape {
     order: Order,
 }
 
-/// Memory that [`Dataset::refined`] takes for the points of `grid` [bytes].
+/// Memory that [`Dataset::refined`] takes for the points of `grid` (bytes).
 #[must_use]
 pub fn base_memory(grid: &Grid) -> usize {
     let row = grid.joints() * size_of::<f64>() + size_of::<f64>() + size_of::<f32>() + size_of::<u8>();

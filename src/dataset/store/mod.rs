@@ -101,9 +101,9 @@ pub enum PublishError {
 /// The interpolated function at one configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Root {
-    /// w [sqrt(J)].
+    /// w (sqrt(J)).
     pub value: f64,
-    /// Its gradient [sqrt(J)/rad or /m].
+    /// Its gradient (sqrt(J)/rad or /m).
     pub slopes: JointVector,
     /// Levels with a block around the configuration; 0 if there is none.
     pub levels: u32,
@@ -126,13 +126,13 @@ struct Gathered {
 }
 
 impl Root {
-    /// Energy of contact, `U = max(0, w)^2 / 2` [J].
+    /// Energy of contact, `U = max(0, w)^2 / 2` (J).
     #[must_use]
     pub fn energy(&self) -> f64 {
         0.5 * self.value.max(0.0).powi(2)
     }
 
-    /// Contact torque, `-dU/dq` where the slopes are the gradient of w: zero at w = 0, without a jump [N m or N].
+    /// Contact torque, `-dU/dq` where the slopes are the gradient of w: zero at w = 0, without a jump (N m or N).
     #[must_use]
     pub fn torque(&self) -> JointVector {
         let mut torque = self.slopes;
@@ -481,7 +481,7 @@ impl Store {
         })
     }
 
-    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own [bytes].
+    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).
     #[must_use]
     pub fn most_bytes(joints: usize, nodes: usize) -> [usize; 2] {
         let record = size_of::<f32>() * width(joints);
@@ -491,14 +491,14 @@ impl Store {
         [memory, file].map(|each| nodes.saturating_mul(each))
     }
 
-    /// Memory of all blocks [bytes].
+    /// Memory of all blocks (bytes).
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.blocks.iter().map(|(_, block)| block.bytes() + 2 * size_of::<usize>()).sum()
     }
 }
 
-/// The numbers of a node from its energy U [J], torque [N m] and tangent d tau/d q, lower triangle [N m/rad]: `w =
+/// The numbers of a node from its energy U (J), torque (N m) and tangent d tau/d q, lower triangle (N m/rad): `w =
 /// sqrt(2 U)`, `w_a = -tau_a / w`, `w_ab = -(d tau_a/d q_b + w_a w_b) / w`. Without a tangent the mixed derivatives are
 /// zero.
 #[must_use]

@@ -17,7 +17,7 @@ const LEVEL_BITS: u32 = 4;
 /// Most levels.
 pub const MAX_LEVELS: u32 = 1 << LEVEL_BITS;
 
-/// Most joints with blocks of 2^d nodes [1]. More: blocks of which a cell uses few nodes. Fewer: more look-ups in the
+/// Most joints with blocks of 2^d nodes (1). More: blocks of which a cell uses few nodes. Fewer: more look-ups in the
 /// directory for a cell.
 pub const MOST_BLOCK_JOINTS: usize = 3;
 
@@ -26,9 +26,9 @@ pub const MOST_BLOCK_JOINTS: usize = 3;
 pub struct Space {
     joints: usize,
     levels: u32,
-    /// First coordinate of each axis [rad or m].
+    /// First coordinate of each axis (rad or m).
     start: [f64; MAX_JOINTS],
-    /// Spacing of the base [rad or m].
+    /// Spacing of the base (rad or m).
     step: [f64; MAX_JOINTS],
     /// Cells of the base along each axis.
     cells: [u32; MAX_JOINTS],
@@ -118,7 +118,7 @@ impl Space {
         self.levels
     }
 
-    /// Spacing of `level` along `axis` [rad or m].
+    /// Spacing of `level` along `axis` (rad or m).
     #[must_use]
     pub fn step(&self, level: u32, axis: usize) -> f64 {
         self.step[axis] / f64::from(1_u32 << level)
@@ -159,7 +159,7 @@ impl Space {
         self.cells.map(|cells| cells << level)
     }
 
-    /// Configuration of a node [rad or m].
+    /// Configuration of a node (rad or m).
     #[must_use]
     pub fn configuration(&self, level: u32, node: &Place) -> crate::JointVector {
         let mut q = crate::JointVector::zeros(self.joints);

@@ -60,7 +60,7 @@ impl DeviceState {
         &self.device_id
     }
 
-    /// Returns where the cursor is [m], if the frame says so. Every coordinate is finite: JSON has no other numbers.
+    /// Returns where the cursor is (m), if the frame says so. Every coordinate is finite: JSON has no other numbers.
     #[must_use]
     pub fn cursor_position(&self) -> Option<[f64; 3]> {
         let Vector { x, y, z } = self.state.as_ref()?.cursor_position?;

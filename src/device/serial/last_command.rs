@@ -13,7 +13,7 @@ const MOST_LINES: usize = 64;
 const FREE: i32 = -1;
 const TAKEN: i32 = -2;
 
-/// Time for a message that was cut off to leave [ms].
+/// Time for a message that was cut off to leave (ms).
 const PAUSE: libc::c_int = 5;
 
 struct Line {

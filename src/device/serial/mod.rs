@@ -33,17 +33,17 @@ const PATIENCE: u32 = 3;
 /// Most requests without a reply that are remembered; the oldest is then given up.
 const REMEMBERED: usize = 8;
 
-/// Speed that no joint reaches in a hand [rad/s]. Bytes of two replies that are taken for one give leaps far beyond it.
+/// Speed that no joint reaches in a hand (rad/s). Bytes of two replies that are taken for one give leaps far beyond it.
 const FASTEST: f64 = 100.0;
 
-/// Time without a valid reply after which the device is given up [s]: long enough for a USB hub to reset.
+/// Time without a valid reply after which the device is given up (s): long enough for a USB hub to reset.
 const LONGEST_SILENCE: f64 = 0.1;
 
-/// Time without requests after which a reply is lost and not late [s]: many times what a USB line delays, and short of
+/// Time without requests after which a reply is lost and not late (s): many times what a USB line delays, and short of
 /// [`LONGEST_SILENCE`].
 const LATEST_REPLY: f64 = 0.05;
 
-/// Longest message of any protocol [bytes].
+/// Longest message of any protocol (bytes).
 const LONGEST: usize = 128;
 
 /// Most bytes that are taken in a tick: the longest replies to all requests that are remembered. More: a line that floods
@@ -57,7 +57,7 @@ pub enum Reply {
     Partial,
     /// A whole reply.
     Position {
-        /// Joint coordinates [rad].
+        /// Joint coordinates (rad).
         position: JointVector,
         /// Bytes of it.
         length: usize,
@@ -74,7 +74,7 @@ pub trait Protocol: Send {
     /// Returns what the device can do; its coordinates are joints, as many as there are limits.
     fn limits(&self) -> Limits;
 
-    /// Writes the message that commands `torque` [N m] into `message`, and returns its length.
+    /// Writes the message that commands `torque` (N m) into `message`, and returns its length.
     fn request(&self, torque: &JointVector, message: &mut [u8; LONGEST]) -> usize;
 
     /// Reads the first reply in `bytes`, of which there is one at least.
@@ -95,13 +95,13 @@ pub struct SerialDevice<P> {
     pushes: bool,
     /// Whether commands come, so that none has to be made up to get measurements.
     driven: bool,
-    /// Since each request that has not been answered [s], the oldest first, and how many there are.
+    /// Since each request that has not been answered (s), the oldest first, and how many there are.
     asked: [f64; REMEMBERED],
     unanswered: usize,
     /// Whether the last request waits for its reply, and for how many ticks.
     waits: bool,
     waited: u32,
-    /// Since the last valid reply [s], and what was wrong since.
+    /// Since the last valid reply (s), and what was wrong since.
     silence: f64,
     wrong: Option<Halt>,
     latest: Measurement,
@@ -168,7 +168,7 @@ impl<P: Protocol> SerialDevice<P> {
         Err(self.wrong.unwrap_or(Halt::Stale))
     }
 
-    /// Takes in what has come, `elapsed` [s] after the last call; true if it made a whole reply.
+    /// Takes in what has come, `elapsed` (s) after the last call; true if it made a whole reply.
     fn receive(&mut self, elapsed: f64) -> Result<bool, Halt> {
         self.asked.iter_mut().for_each(|asked| *asked += elapsed);
         self.latest.age += elapsed;
@@ -216,7 +216,7 @@ impl<P: Protocol> SerialDevice<P> {
         Ok(whole)
     }
 
-    /// Takes the oldest request as answered; returns how long ago it was sent [s].
+    /// Takes the oldest request as answered; returns how long ago it was sent (s).
     fn answered(&mut self) -> Option<f64> {
         self.waits = false;
         self.unanswered = self.unanswered.checked_sub(1)?;
@@ -281,7 +281,7 @@ impl<P: Protocol> SerialDevice<P> {
     }
 }
 
-/// Tries to get a first reply, reads of each, and time between them [s].
+/// Tries to get a first reply, reads of each, and time between them (s).
 const TRIES: usize = 20;
 const TRY_READS: usize = 10;
 const READ_TIME: f64 = 5e-3;

@@ -7,9 +7,9 @@
 //! | reset | `00 00` |
 //! | setup | `01 id`, motors, encoders, `0` sensors, `0` pwm pins, scales |
 //! | motors, encoders | `mask`, a direction each |
-//! | scales, of each encoder in the order of ports | `f32` offset [deg], `f32` counts per revolution |
-//! | torques | `02 id`, `f32` torque of each motor in the order of ports [N m] |
-//! | reply to torques | `id`, `f32` angle of each encoder in the order of ports [deg] |
+//! | scales, of each encoder in the order of ports | `f32` offset (deg), `f32` counts per revolution |
+//! | torques | `02 id`, `f32` torque of each motor in the order of ports (N m) |
+//! | reply to torques | `id`, `f32` angle of each encoder in the order of ports (deg) |
 //!
 //! Bit k - 1 of a mask is port k; directions are in the order of ports, 1 for counter-clockwise. Joint 1 is on port 2
 //! and joint 2 on port 1. The firmware clamps torques to 0.123 N m and **has no watchdog**: it holds the last torque
@@ -27,13 +27,13 @@ use crate::{
 /// Number that the device answers with, as the maker's examples have it.
 const ID: u8 = 5;
 
-/// Maximum torque of a motor [N m].
+/// Maximum torque of a motor (N m).
 const MOST_TORQUE: f64 = 0.123;
 
-/// Largest angle that can be one [deg]: two turns from the offset of either version.
+/// Largest angle that can be one (deg): two turns from the offset of either version.
 const LARGEST_ANGLE: f32 = 1000.0;
 
-/// Length of a reply [bytes].
+/// Length of a reply (bytes).
 const REPLY: usize = 9;
 
 /// Which 2DIY: motors and encoders are mounted differently.
@@ -54,7 +54,7 @@ impl Version {
         }
     }
 
-    /// Returns offset [deg] and counts per revolution of the encoders, in the order of ports.
+    /// Returns offset (deg) and counts per revolution of the encoders, in the order of ports.
     fn encoders(self) -> [[f32; 2]; 2] {
         match self {
             Self::V2 => [[-61.0, 10752.0], [241.0, 10752.0]],

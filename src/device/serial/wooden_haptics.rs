@@ -1,6 +1,6 @@
 //! WoodenHaptics: a desktop device of three joints driven by capstans, on the USB serial line of a Teensy 4.0.
 //!
-//! The host sends `[a,b,c]\n`, motor currents [mA]; the device answers `[model,n0,n1,n2,n3,n4,n5,error]\n`, encoder
+//! The host sends `[a,b,c]\n`, motor currents (mA); the device answers `[model,n0,n1,n2,n3,n4,n5,error]\n`, encoder
 //! counts. A current beyond 6000 mA counts as zero. Amplifiers are off 100 ms after the last message. A second message
 //! before the reply is an error.
 //!
@@ -27,17 +27,17 @@ const COUNTS: f64 = 2000.0;
 /// Counts in the home position.
 const HOME: [i32; 3] = [0, 0, 6000];
 
-/// Radius of each motor's capstan over that of its drum [1].
+/// Radius of each motor's capstan over that of its drum (1).
 const RATIO: [f64; 3] = [0.010 / 0.160, 0.010 / 0.120, 0.010 / 0.120];
 
-/// Torque of a motor per current [N m/A].
+/// Torque of a motor per current (N m/A).
 const TORQUE_CONSTANT: f64 = 0.0259;
 
-/// Maximum torque of each joint [N m]: the device is specified for 5 N at its tip, whose lever arms are at most 0.205 +
+/// Maximum torque of each joint (N m): the device is specified for 5 N at its tip, whose lever arms are at most 0.205 +
 /// 0.245 m about the first joint, and the length of the own link about the others.
 const MOST_TORQUE: [f64; 3] = [5.0 * 0.450, 5.0 * 0.205, 5.0 * 0.245];
 
-/// Time after which the amplifiers are off [s].
+/// Time after which the amplifiers are off (s).
 const WATCHDOG: f64 = 0.1;
 
 /// Errors of the line that the device reports: a message was mangled or came too early. Others are of sensors that are
@@ -93,7 +93,7 @@ impl Protocol for WoodenHaptics {
     }
 }
 
-/// Angles in the home position [rad].
+/// Angles in the home position (rad).
 const HOME_ANGLE: [f64; 3] = [
     TAU * HOME[0] as f64 / COUNTS * RATIO[0],
     TAU * HOME[1] as f64 / COUNTS * RATIO[1],

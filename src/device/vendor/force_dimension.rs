@@ -1,5 +1,5 @@
-//! Force Dimension omega, delta, sigma, lambda, and other devices of its library: Cartesian, positions [m] and forces
-//! [N].
+//! Force Dimension omega, delta, sigma, lambda, and other devices of its library: Cartesian, positions (m) and forces
+//! (N).
 //!
 //! The maker's library `libdrd` is opened at run time. Return codes: 0; -1 an error, which `dhdErrorGetLast` numbers; 1
 //! from a reading, that it came too soon after the last and is old (the time guard); 2 from a command, that the motors
@@ -40,13 +40,13 @@ functions! {
     }
 }
 
-/// Maximum force [N]: below that of every device of the library, of which the Falcon's is the least.
+/// Maximum force (N): below that of every device of the library, of which the Falcon's is the least.
 const MOST_FORCE: f64 = 8.0;
 
-/// Time after the last command at which the device lets go [s].
+/// Time after the last command at which the device lets go (s).
 pub const WATCHDOG: f64 = 0.01;
 
-/// The watchdog counts in these [s].
+/// The watchdog counts in these (s).
 const WATCHDOG_UNIT: f64 = 125e-6;
 
 /// Return codes.

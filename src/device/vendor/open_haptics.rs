@@ -1,4 +1,4 @@
-//! 3D Systems Touch and Phantom devices: three joints, angles [rad] and torques [N m] here, [mN m] in the library.
+//! 3D Systems Touch and Phantom devices: three joints, angles (rad) and torques (N m) here, (mN m) in the library.
 //!
 //! The maker's library `libHD` (OpenHaptics) is opened at run time. **Its scheduler owns the thread** in which a device
 //! may be read and driven: the loop runs as a callback of it ([`Scheduler`]), a frame a tick, which reading opens and
@@ -83,10 +83,10 @@ const CALLBACK_DONE: c_uint = 0;
 const CALLBACK_CONTINUE: c_uint = 1;
 const HIGHEST_PRIORITY: u16 = 65_535;
 
-/// Rate of the scheduler [Hz].
+/// Rate of the scheduler (Hz).
 const RATE: c_ulong = 1000;
 
-/// Maximum torque of each joint [N m]: what the maker's own samples clamp to, of the smallest device.
+/// Maximum torque of each joint (N m): what the maker's own samples clamp to, of the smallest device.
 const MOST_TORQUE: [f64; 3] = [0.200, 0.350, 0.200];
 
 /// Most errors that are taken from the stack at once: a library that never empties it must not hold the loop.
@@ -221,7 +221,7 @@ impl Api {
         angles
     }
 
-    /// Commands torques [N m], if any, and ends the frame.
+    /// Commands torques (N m), if any, and ends the frame.
     fn end(&self, torque: Option<[f64; 3]>) {
         // SAFETY: the library reads three numbers.
         unsafe {

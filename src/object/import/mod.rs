@@ -21,13 +21,13 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Longest object that is meant in metres [m]: what is longer was drawn in millimetres.
+/// Longest object that is meant in metres (m): what is longer was drawn in millimetres.
 pub(crate) const MOST_METRES: f64 = 10.0;
 
 /// Nodes and triangles as a reader finds them.
 type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 
-/// Longest mesh file that is read [B]: an object whose compliance fits in memory has less than a hundredth of that.
+/// Longest mesh file that is read (B): an object whose compliance fits in memory has less than a hundredth of that.
 const MAX_BYTES: u64 = 1 << 28;
 
 /// Reads the surface in `file`; merged nodes are reported in `warnings`.
@@ -85,7 +85,7 @@ pub(super) fn read_tetrahedra(
     Ok(ordered)
 }
 
-/// Greatest extent of `nodes` along an axis [m].
+/// Greatest extent of `nodes` along an axis (m).
 pub(crate) fn length(nodes: &[DVec3]) -> f64 {
     let end = |pick: fn(DVec3, DVec3) -> DVec3| nodes.iter().copied().reduce(pick).unwrap_or_default();
     (end(DVec3::max) - end(DVec3::min)).max_element()

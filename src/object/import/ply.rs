@@ -43,7 +43,7 @@ pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
     Ok((nodes, triangles))
 }
 
-/// Longest header [bytes].
+/// Longest header (bytes).
 const MAX_HEADER: u64 = 1 << 16;
 
 /// Longest run of digits in it: more may be no `u64`.

@@ -10,7 +10,7 @@
 use crate::{contact::NodeForce, dataset::Dataset, field::stencil::LatticeError, render::force_rows::ForceRows};
 use glam::DVec3;
 
-/// Least force that counts as a contact when friction or damping acts on it [N]: far below what is felt, and large
+/// Least force that counts as a contact when friction or damping acts on it (N): far below what is felt, and large
 /// enough that a normal is known to rounding.
 const LEAST_CONTACT_FORCE: f64 = 1e-9;
 
@@ -25,14 +25,14 @@ pub enum Contacts {
 /// The contact of one proxy node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Touch {
-    /// On the proxy node [N].
+    /// On the proxy node (N).
     pub force: DVec3,
     /// Share of the corners at which it is touched, 0 to 1.
     pub share: f64,
 }
 
 impl Touch {
-    /// Outward normal and normal force [N]; `None` where nothing touches.
+    /// Outward normal and normal force (N); `None` where nothing touches.
     pub fn normal(&self) -> Option<(DVec3, f64)> {
         let force = self.force.length();
         (force > LEAST_CONTACT_FORCE).then(|| (self.force / force, force))

@@ -34,12 +34,12 @@ const MOST_SOLVES: usize = 8;
 /// The constants of friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// Kinetic and static mu [1].
+    /// Kinetic and static mu (1).
     kinetic: f64,
     stiction: f64,
-    /// k [N/m].
+    /// k (N/m).
     stiffness: f64,
-    /// s [N s/m].
+    /// s (N s/m).
     damping: f64,
 }
 
@@ -111,17 +111,17 @@ impl Friction {
         step
     }
 
-    /// Tangential force while slipping [N].
+    /// Tangential force while slipping (N).
     fn cone(&self, patch: &Patch) -> f64 {
         self.kinetic * patch.pressure
     }
 
-    /// Tangential force at which sticking ends [N].
+    /// Tangential force at which sticking ends (N).
     fn sticking_cone(&self, patch: &Patch) -> f64 {
         if patch.slipped { self.cone(patch) } else { self.stiction * patch.pressure }
     }
 
-    /// Force of the bristle that holds, opposed by friction [N].
+    /// Force of the bristle that holds, opposed by friction (N).
     fn holding(&self, patch: &Patch, slide: DVec3, interval: f64) -> DVec3 {
         self.stiffness * (patch.bristle + 0.5 * slide) + self.damping / interval * slide
     }
@@ -158,7 +158,7 @@ impl Friction {
         loaded
     }
 
-    /// The bristle after the step, and the work of friction on the proxy [J].
+    /// The bristle after the step, and the work of friction on the proxy (J).
     fn settle(&self, patch: &Patch, slide: DVec3, interval: f64) -> (DVec3, f64) {
         let moved = patch.bristle + slide;
         match patch.mode {

@@ -30,7 +30,7 @@ pub struct ContactEffects {
     chain: Chain,
     contacts: Contacts,
     friction: Option<Friction>,
-    /// c [N s/m]; zero where the scene names no contact damping.
+    /// c (N s/m); zero where the scene names no contact damping.
     damping: f64,
 }
 
@@ -40,13 +40,13 @@ pub(super) struct Pending<'a> {
     pub npmi: &'a Npmi,
     /// Inertia in its middle.
     pub stage: &'a MidpointInertia,
-    /// T [s].
+    /// T (s).
     pub interval: f64,
     /// Forces beside those of the effects.
     pub load: Load,
-    /// The factor that the field puts on contact torque and forces; zero out of contact [1].
+    /// The factor that the field puts on contact torque and forces; zero out of contact (1).
     pub share: f64,
-    /// Contact forces that were solved at the proxy [N].
+    /// Contact forces that were solved at the proxy (N).
     pub solved: &'a [NodeForce],
 }
 
@@ -64,7 +64,7 @@ pub struct EffectState {
 /// State of the friction at a proxy node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Bristle {
-    /// In the world [m].
+    /// In the world (m).
     deflection: DVec3,
     /// Whether it slipped in the last step.
     slipped: bool,
@@ -76,13 +76,13 @@ struct Patch {
     node: usize,
     /// Outwards of the object.
     normal: DVec3,
-    /// Normal force [N].
+    /// Normal force (N).
     pressure: f64,
     /// Share of the contact, 0 to 1.
     share: f64,
     /// J_i.
     columns: [DVec3; MAX_JOINTS],
-    /// Deflection of the bristle, tangential [m].
+    /// Deflection of the bristle, tangential (m).
     bristle: DVec3,
     /// Whether it slipped in the last step.
     slipped: bool,
@@ -189,7 +189,7 @@ impl ContactEffects {
         }
     }
 
-    /// `sum_i c share_i J_i^T N N^T J_i` [N m s/rad].
+    /// `sum_i c share_i J_i^T N N^T J_i` (N m s/rad).
     fn contact_damping(&self, patches: &[Patch]) -> JointMatrix {
         let mut damping = [[0.0; MAX_JOINTS]; MAX_JOINTS];
         if self.damping > 0.0 {
@@ -215,7 +215,7 @@ impl EffectState {
 }
 
 impl Patch {
-    /// Tangential way for joint rates `velocity` over `interval` [m].
+    /// Tangential way for joint rates `velocity` over `interval` (m).
     fn slide(&self, velocity: &JointVector, interval: f64) -> DVec3 {
         let way: DVec3 = self.columns.iter().zip(velocity.iter()).map(|(column, v)| interval * v * *column).sum();
         way.reject_from_normalized(self.normal)

@@ -1,4 +1,4 @@
-//! Non-iterative passive mechanical integration of the proxy (section 3.1; theory of [3, 15]), with constant inertia or
+//! Non-iterative passive mechanical integration of the proxy (section 3.1; theory of \[3, 15\]), with constant inertia or
 //! with inertia that depends on the configuration.
 //!
 //! *Coordinates.* `M = L L^T`, and `p = L^T v` is kept from step to step: the kinetic energy is `1/2 |p|^2`. The
@@ -72,35 +72,35 @@ pub struct MidpointInertia {
 /// Position and momentum of the proxy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// x [rad or m].
+    /// x (rad or m).
     pub position: JointVector,
-    /// v [rad/s or m/s].
+    /// v (rad/s or m/s).
     pub velocity: JointVector,
-    /// p = L^T v [sqrt(J)].
+    /// p = L^T v (sqrt(J)).
     momentum: JointVector,
 }
 
 /// Forces on the proxy during a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
-    /// K of each joint, not negative [N m/rad].
+    /// K of each joint, not negative (N m/rad).
     pub stiffness: JointVector,
-    /// Where the springs K pull to [rad or m].
+    /// Where the springs K pull to (rad or m).
     pub target: JointVector,
-    /// D, positive semidefinite [N m s/rad].
+    /// D, positive semidefinite (N m s/rad).
     pub damping: JointMatrix,
-    /// f [N m or N].
+    /// f (N m or N).
     pub torque: JointVector,
-    /// Least and greatest coordinate that each joint may reach; x_k lies between them [rad or m].
+    /// Least and greatest coordinate that each joint may reach; x_k lies between them (rad or m).
     pub stops: Stops,
 }
 
 /// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// v_hat [rad/s or m/s].
+    /// v_hat (rad/s or m/s).
     pub velocity: JointVector,
-    /// Work of the stops, impact included; never positive but for rounding [J].
+    /// Work of the stops, impact included; never positive but for rounding (J).
     pub stop_work: f64,
     /// Joints that ended at a stop.
     pub stopped: [bool; MAX_JOINTS],
@@ -131,7 +131,7 @@ impl Motion {
         Self { position: *position, velocity: zero, momentum: zero }
     }
 
-    /// 1/2 |p|^2 [J].
+    /// 1/2 |p|^2 (J).
     #[must_use]
     pub fn kinetic_energy(&self) -> f64 {
         0.5 * self.momentum.dot(&self.momentum)
@@ -139,7 +139,7 @@ impl Motion {
 }
 
 impl Npmi {
-    /// A proxy of constant inertia `inertia` [kg m^2] and one pair of limits [rad or m] per joint.
+    /// A proxy of constant inertia `inertia` (kg m^2) and one pair of limits (rad or m) per joint.
     ///
     /// # Errors
     /// When the inertia is not positive definite or a limit is none.
@@ -171,7 +171,7 @@ impl Npmi {
         self.joints
     }
 
-    /// The joint limits [rad or m].
+    /// The joint limits (rad or m).
     #[must_use]
     pub fn limits(&self) -> &Stops {
         &self.limits
@@ -195,7 +195,7 @@ impl Npmi {
         Motion { momentum: stage.momentum_of(velocity), ..motion }
     }
 
-    /// L, M and S for a step of `interval` T [s] from `motion`.
+    /// L, M and S for a step of `interval` T (s) from `motion`.
     #[must_use]
     pub fn stage(&self, motion: &Motion, interval: f64) -> MidpointInertia {
         match &self.inertia {
@@ -204,7 +204,7 @@ impl Npmi {
         }
     }
 
-    /// Moves the proxy by one step of `interval` T > 0 [s] under `load`. `motion.position` must lie between the stops
+    /// Moves the proxy by one step of `interval` T > 0 (s) under `load`. `motion.position` must lie between the stops
     /// of `load` and lies there afterwards.
     pub fn step(&self, motion: &mut Motion, interval: f64, load: &Load) -> Step {
         self.advance(&self.stage(motion, interval), motion, interval, load)
@@ -266,7 +266,7 @@ impl Npmi {
 }
 
 impl MidpointInertia {
-    /// Evaluates `chain` at the predicted midpoint of a step of `interval` T [s] from `motion`.
+    /// Evaluates `chain` at the predicted midpoint of a step of `interval` T (s) from `motion`.
     fn of(chain: &Chain, motion: &Motion, interval: f64) -> Self {
         let joints = motion.position.len();
         let mut middle = motion.position;
@@ -288,20 +288,20 @@ impl MidpointInertia {
         stage
     }
 
-    /// M vdot [N m].
+    /// M vdot (N m).
     #[must_use]
     pub fn inertial_torque(&self, acceleration: &JointVector) -> JointVector {
         product(&self.inertia, acceleration)
     }
 
-    /// Adds `rate` M to `damping` [1/s].
+    /// Adds `rate` M to `damping` (1/s).
     pub(super) fn add_inertia(&self, rate: f64, damping: &mut JointMatrix) {
         for (entry, inertia) in damping.iter_mut().flatten().zip(self.inertia.iter().flatten()) {
             *entry += rate * inertia;
         }
     }
 
-    /// v^T M v [J].
+    /// v^T M v (J).
     pub(super) fn twice_kinetic_energy(&self, velocity: &JointVector) -> f64 {
         velocity.dot(&self.inertial_torque(velocity))
     }

@@ -8,7 +8,7 @@
 use super::linear::solve_held;
 use crate::{JointVector, MAX_JOINTS, proxy::JointMatrix};
 
-/// Pull of a joint stop, relative to the terms that balance it, that is taken for rounding [1]: the balance is a sum of
+/// Pull of a joint stop, relative to the terms that balance it, that is taken for rounding (1): the balance is a sum of
 /// eight terms of a solution whose residual is a few times the order of the matrix, six, in machine precision.
 const STOP_ROUNDING: f64 = 64.0 * f64::EPSILON;
 

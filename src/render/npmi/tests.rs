@@ -62,7 +62,7 @@ fn spring_energy(load: &Load, x: &JointVector) -> f64 {
     0.5 * (0..x.len()).map(|a| load.stiffness[a] * (x[a] - load.target[a]).powi(2)).sum::<f64>()
 }
 
-/// Change of stored energy less the work of everything, and the scale of its rounding [J].
+/// Change of stored energy less the work of everything, and the scale of its rounding (J).
 fn imbalance(npmi: &Npmi, motion: &mut Motion, interval: f64, load: &Load) -> (f64, f64) {
     let stored = |m: &Motion| m.kinetic_energy() + spring_energy(load, &m.position);
     let before = stored(motion);

@@ -353,7 +353,7 @@ fn lines(scan: &ScanSpec) -> String {
     }
 }
 
-/// Distance of neighbouring positions [mm].
+/// Distance of neighbouring positions (mm).
 fn resolution(scan: &ScanSpec) -> Value {
     match &scan.plan {
         PlanSpec::Workspace(plan) => Value::Number(1e3 * plan.depth.spacing),

@@ -23,10 +23,10 @@ use glam::DVec3;
 const WIDTH: f64 = 860.0;
 const CELL: [f64; 2] = [400.0, 320.0];
 const TOP: f64 = 88.0;
-/// Radius of a link and of a dot [m].
+/// Radius of a link and of a dot (m).
 const LINK: f64 = 3e-3;
 const DOT: f64 = 8e-4;
-/// Distance from the block below which a dot is left out: it would be half inside [m].
+/// Distance from the block below which a dot is left out: it would be half inside (m).
 const CLEAR: f64 = 1e-3;
 const SPONGE: Colour = Colour::hex(0xf2_d3_7d);
 const MEASURED: Colour = Colour::hex(0x00_72_b2);

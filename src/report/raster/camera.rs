@@ -30,7 +30,7 @@ pub struct Projected {
     pub x: f64,
     /// Pixels from the top edge.
     pub y: f64,
-    /// One over the distance along the view [1/m]; larger is nearer.
+    /// One over the distance along the view (1/m); larger is nearer.
     pub nearness: f64,
 }
 

@@ -6,12 +6,12 @@
 
 use crate::JointVector;
 
-/// Time from taking hold to taking hold [s].
+/// Time from taking hold to taking hold (s).
 const INTERVAL: f64 = 2.0;
 /// When the wanted position is at each way point (taken, last approach, approach, place, place), as shares of the
 /// interval; at the last one the button comes up.
 const SHARES: [f64; 5] = [0.0, 0.14, 0.30, 0.44, 0.50];
-/// Time in which the fingers close or open [s].
+/// Time in which the fingers close or open (s).
 const CLOSING: f64 = 0.15;
 /// Stiffness and damping of the grip [N m/rad or N/m, N m s/rad or N s/m]: a hand's is a few hundred N/m (Kuchenbecker,
 /// Park and Niemeyer 2003), at a tenth of a metre.
@@ -28,14 +28,14 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// A hand that leads to each of `visits`: an approach, outside of the object, and the place itself [rad or m].
+    /// A hand that leads to each of `visits`: an approach, outside of the object, and the place itself (rad or m).
     #[must_use]
     pub fn new(visits: Vec<[JointVector; 2]>) -> Self {
         let joints = visits.first().map_or(0, |visit| visit[0].len());
         Self { visits, visit: None, taken: JointVector::zeros(joints) }
     }
 
-    /// Time that all visits take [s].
+    /// Time that all visits take (s).
     #[must_use]
     pub fn duration(&self) -> f64 {
         self.visits.len() as f64 * INTERVAL
@@ -74,7 +74,7 @@ impl Hand {
     }
 }
 
-/// Number of the visit, and time since it began [s].
+/// Number of the visit, and time since it began (s).
 fn phase(time: f64) -> (usize, f64) {
     let visit = (time / INTERVAL).floor();
     (visit as usize, time - visit * INTERVAL)

@@ -25,7 +25,7 @@ use noise::Noise;
 
 /// Steps of the simulation within one control period.
 const STEPS: usize = 4;
-/// Viscous friction of the device's joints, relative to their inertia [1/s].
+/// Viscous friction of the device's joints, relative to their inertia (1/s).
 const VISCOUS: f64 = 5.0;
 
 /// A device and a block, simulated.

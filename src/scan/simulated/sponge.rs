@@ -22,28 +22,28 @@
 use crate::scene::{Cover, SpecimenSpec};
 use glam::DVec3;
 
-/// Young's modulus of the foam at small strain [Pa].
+/// Young's modulus of the foam at small strain (Pa).
 const MODULUS: f64 = 9e3;
-/// Plateau pressure [Pa].
+/// Plateau pressure (Pa).
 const PLATEAU: f64 = 3.5e3;
-/// Scale of densification [Pa].
+/// Scale of densification (Pa).
 const DENSIFICATION: f64 = 6e3;
-/// Strain beyond which the pressure goes on linearly, so that it stays finite [1].
+/// Strain beyond which the pressure goes on linearly, so that it stays finite (1).
 const GREATEST_STRAIN: f64 = 0.9;
-/// Tension of the foam's own skin, and of the fabric [N/m].
+/// Tension of the foam's own skin, and of the fabric (N/m).
 const TENSION: [f64; 2] = [4.0, 22.0];
-/// Where the sheet is held, from the node [m].
+/// Where the sheet is held, from the node (m).
 const SHEET_RADIUS: f64 = 0.05;
-/// Strength of the Maxwell branches [1].
+/// Strength of the Maxwell branches (1).
 const BRANCHES: [f64; 2] = [0.25, 0.12];
-/// Their relaxation times [s].
+/// Their relaxation times (s).
 const RELAXATION: [f64; 2] = [0.03, 0.25];
-/// Tangential stiffness while a node sticks [N/m].
+/// Tangential stiffness while a node sticks (N/m).
 const STICKING: f64 = 300.0;
 /// Rings over which the pressure under a node is summed, and points on each.
 const RINGS: usize = 4;
 const POINTS: usize = 8;
-/// Least radius of a node: a point has no shadow [m].
+/// Least radius of a node: a point has no shadow (m).
 const LEAST_RADIUS: f64 = 1e-3;
 
 /// The block.
@@ -59,13 +59,13 @@ pub struct Sponge {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeContact {
     face: Option<Face>,
-    /// Overstress of each branch [N].
+    /// Overstress of each branch (N).
     overstress: [f64; BRANCHES.len()],
-    /// Elastic force at the last step [N].
+    /// Elastic force at the last step (N).
     elastic: f64,
-    /// Tangential stretch of the sticking spring [m].
+    /// Tangential stretch of the sticking spring (m).
     stretch: DVec3,
-    /// Position at the last step [m].
+    /// Position at the last step (m).
     position: DVec3,
 }
 
@@ -102,7 +102,7 @@ impl Sponge {
         Self { corner: spec.corner, size: spec.size, tension, friction: spec.friction }
     }
 
-    /// Force on a node of `radius` at `position`, `time` [s] after the last step; `contact` is its history.
+    /// Force on a node of `radius` at `position`, `time` (s) after the last step; `contact` is its history.
     pub fn force(&self, contact: &mut NodeContact, position: DVec3, radius: f64, time: f64) -> DVec3 {
         let radius = radius.max(LEAST_RADIUS);
         let face = contact.face.or_else(|| self.entered(position, radius));
@@ -140,7 +140,7 @@ impl Sponge {
     }
 
     /// Returns how far the node's foremost point is below `face`, if it is above the block's shadow; negative outside
-    /// [m].
+    /// (m).
     fn depth(&self, face: Face, position: DVec3, radius: f64) -> f64 {
         let relative = position[face.axis] - self.corner[face.axis];
         let below = if face.upper { self.size[face.axis] - relative } else { relative };
@@ -151,13 +151,13 @@ impl Sponge {
         if beside { -radius } else { below + radius }
     }
 
-    /// Share of the node's shadow that falls on `face` [1].
+    /// Share of the node's shadow that falls on `face` (1).
     fn shadow(&self, face: Face, position: DVec3, radius: f64) -> f64 {
         let on_face = self.samples(face, position, radius).filter(|(_, on)| *on).count();
         on_face as f64 / (RINGS * POINTS) as f64
     }
 
-    /// Elastic normal force of a node whose foremost point is at `depth` [N].
+    /// Elastic normal force of a node whose foremost point is at `depth` (N).
     fn elastic(&self, face: Face, position: DVec3, radius: f64, depth: f64) -> f64 {
         let height = self.size[face.axis];
         let area = std::f64::consts::PI * radius * radius / (RINGS * POINTS) as f64;
@@ -188,7 +188,7 @@ impl Sponge {
     }
 }
 
-/// Pressure of a foam column at a strain [Pa].
+/// Pressure of a foam column at a strain (Pa).
 fn pressure(strain: f64) -> f64 {
     let bounded = strain.min(GREATEST_STRAIN);
     let gap = 1.0 - bounded;

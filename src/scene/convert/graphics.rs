@@ -5,11 +5,11 @@ use super::super::error::SceneError;
 use super::super::file::GraphicsTable;
 use super::super::{GraphicsEffects, GraphicsSpec, Material, ObjectSpec, StiffeningSpec};
 
-/// Lowest frame rate [Hz]: motion is no longer seen long before.
+/// Lowest frame rate (Hz): motion is no longer seen long before.
 const LOWEST_RATE: f64 = 1.0;
-/// Highest frame rate [Hz].
+/// Highest frame rate (Hz).
 const HIGHEST_RATE: f64 = 1e4;
-/// Default frame rate [Hz].
+/// Default frame rate (Hz).
 const RATE: f64 = 60.0;
 
 /// Greatest factor of stiffening: what the integrator takes beyond the springs' own energy grows with it.

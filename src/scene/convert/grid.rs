@@ -11,7 +11,7 @@ use toml::Spanned;
 
 /// Most grid points: `point * joints + joint` then fits 32 bits, as GPU kernels count.
 const MAX_POINTS: usize = 1 << 28;
-/// Disk of one point beside its torques: energy, gap, status, residual, iterations, contact offset [B].
+/// Disk of one point beside its torques: energy, gap, status, residual, iterations, contact offset (B).
 const BYTES_PER_POINT: usize = 8 + 4 + 1 + 4 + 4 + 8;
 
 pub(super) fn convert(

@@ -81,16 +81,16 @@ pub(super) fn convert(
     })
 }
 
-/// Highest rate of the loop [Hz]: a tick takes some microseconds.
+/// Highest rate of the loop (Hz): a tick takes some microseconds.
 const HIGHEST_RATE: f64 = 1e5;
-/// Default stiffness of a bristle [N/m]: a friction of 1 N builds up over 2 mm, below what a fingertip takes for a
+/// Default stiffness of a bristle (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for a
 /// slip.
 const BRISTLE_STIFFNESS: f64 = 500.0;
-/// Default damping of a bristle [N s/m].
+/// Default damping of a bristle (N s/m).
 const BRISTLE_DAMPING: f64 = 1.0;
 /// Default channels of the four-channel coupling: both force channels whole, half of the inertias (see `coupling.rs`).
 const CHANNELS: [f64; 4] = [0.5, 1.0, 1.0, 0.5];
-/// Default time constant of its filter [s].
+/// Default time constant of its filter (s).
 const CHANNEL_FILTER: f64 = 0.005;
 
 fn effects(checker: &Checker<'_>, table: &HapticsTable) -> Result<HapticEffects, SceneError> {

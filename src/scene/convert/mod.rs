@@ -17,11 +17,11 @@ use super::file::{ContactTable, GraphicsEntry, GraphicsTable, NumberOr, SceneTab
 use super::{Algorithm, ContactSpec, ContactSurface, GridSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
 use toml::Spanned;
 
-/// Default relative residual of the contact solver, in the energy norm [1]. Forces are promised to balance K u to 1e-6
+/// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to 1e-6
 /// of the largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two
 /// digits more cost 8 % more iterations on the sphere (5.1 to 5.5).
 const CONTACT_TOLERANCE: f64 = 1e-8;
-/// Default cap on the contact solver's iterations [1].
+/// Default cap on the contact solver's iterations (1).
 const CONTACT_ITERATIONS: u32 = 400;
 
 /// Validates `table`, read from the checker's text, as a scene with a virtual object.
@@ -94,7 +94,7 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     })
 }
 
-/// Most updates of linearised contact [1]: far more than where it settles, and still milliseconds for a configuration.
+/// Most updates of linearised contact (1): far more than where it settles, and still milliseconds for a configuration.
 const MAX_UPDATES: u32 = 1000;
 
 fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneError> {
@@ -114,7 +114,7 @@ fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneErro
     Ok(*value.get_ref())
 }
 
-/// Kc of a node [N/m], that of the mean node where the scene gives the stiffness of links per length, and that [N/m^2].
+/// Kc of a node (N/m), that of the mean node where the scene gives the stiffness of links per length, and that (N/m^2).
 fn stiffness(
     checker: &Checker<'_>,
     table: &Spanned<ContactTable>,

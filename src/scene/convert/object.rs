@@ -12,9 +12,9 @@ use std::ops::Range;
 use std::path::PathBuf;
 use toml::Spanned;
 
-/// Default mass of a node [kg].
+/// Default mass of a node (kg).
 const NODE_MASS: f64 = 0.005;
-/// Default damping of a node against the ground [N s/m].
+/// Default damping of a node against the ground (N s/m).
 const NODE_DAMPING: f64 = 0.5;
 
 /// Most rings, and most nodes of a ring: their product must fit the node numbers; what memory allows is far less, and
@@ -25,7 +25,7 @@ const MAX_RINGS: usize = 1 << 15;
 const MAX_SUBDIVISIONS: usize = 9;
 
 /// Mean edge of an icosahedron on the unit sphere times the parts n that its edges are divided into: the edge of an
-/// equilateral triangle that has a share 1 / (20 n^2) of the sphere's area, sqrt(4 pi / (5 sqrt 3)) [1].
+/// equilateral triangle that has a share 1 / (20 n^2) of the sphere's area, sqrt(4 pi / (5 sqrt 3)) (1).
 const MEAN_EDGE: f64 = 1.2046;
 
 pub(super) fn convert(checker: &Checker<'_>, table: &Spanned<ObjectTable>) -> Result<ObjectSpec, SceneError> {

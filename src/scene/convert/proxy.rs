@@ -9,9 +9,9 @@ use crate::MAX_JOINTS;
 use glam::DMat3;
 use toml::Spanned;
 
-/// Default reflected inertia of the actuator of a revolute joint, that of a desktop device [kg m^2].
+/// Default reflected inertia of the actuator of a revolute joint, that of a desktop device (kg m^2).
 const ROTOR_INERTIA: f64 = 1e-3;
-/// The same of a prismatic joint [kg].
+/// The same of a prismatic joint (kg).
 const ROTOR_MASS: f64 = 0.05;
 /// Longest name, in characters, that still fits a figure's legend.
 const MAX_NAME: usize = 40;
@@ -76,7 +76,7 @@ fn joint(checker: &Checker<'_>, table: &JointTable, index: usize) -> Result<Join
     })
 }
 
-/// Moments, or moments and products, of inertia as a matrix [kg m^2].
+/// Moments, or moments and products, of inertia as a matrix (kg m^2).
 fn inertia(checker: &Checker<'_>, value: &Spanned<Vec<f64>>) -> Result<DMat3, SceneError> {
     let numbers = value.get_ref();
     checker.all_finite("inertia", numbers, value.span())?;
@@ -147,7 +147,7 @@ fn add_nodes(
     Ok(())
 }
 
-/// Number of equal parts, each at most `spacing` long, of a line of `length` [m].
+/// Number of equal parts, each at most `spacing` long, of a line of `length` (m).
 fn intervals(checker: &Checker<'_>, spacing: &Number, length: f64) -> Result<usize, SceneError> {
     let parts = (length / checker.positive("spacing", spacing)? - GRID_LINE).ceil().max(1.0);
     if parts >= MAX_CONTACT_NODES as f64 {

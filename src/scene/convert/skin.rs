@@ -75,7 +75,7 @@ pub(super) fn convert(
     Ok(SkinSpec { tension, bending, foundation })
 }
 
-/// Bending stiffness of a skin that rounds dents over `width` [N m].
+/// Bending stiffness of a skin that rounds dents over `width` (N m).
 fn bending_by_width(
     checker: &Checker<'_>,
     width: &Number,

@@ -7,23 +7,23 @@ use crate::{
 };
 use serde::Serialize;
 
-/// Errors that are asked for, relative to the rms of the torque [1].
+/// Errors that are asked for, relative to the rms of the torque (1).
 pub(super) const TARGETS: [f64; 7] = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01];
 
 /// The grid to take for one error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Offer {
-    /// Relative to the rms of the torque [1].
+    /// Relative to the rms of the torque (1).
     pub target: f64,
     /// Interpolation.
     pub series: String,
-    /// Spacing [rad or m].
+    /// Spacing (rad or m).
     pub spacing: f64,
     /// Grid points.
     pub points: f64,
     /// Bake time over that of the scene as it is.
     pub cost: f64,
-    /// Error, relative [1].
+    /// Error, relative (1).
     pub error: f64,
     /// Whether it was measured; else it follows from the measured order of convergence.
     pub measured: bool,
@@ -66,7 +66,7 @@ impl Accuracy {
 pub struct Limit {
     /// `grid`, `mesh` or `link nodes`.
     pub of: String,
-    /// Estimated rms error at the scene's own setting, relative to the rms torque [1].
+    /// Estimated rms error at the scene's own setting, relative to the rms torque (1).
     pub error: f64,
     /// Observed order p, error ~ h^p; absent where errors do not fall.
     pub order: Option<f64>,

@@ -19,17 +19,17 @@ use crate::{
 };
 use std::{hint::black_box, time::Instant};
 
-/// Speed of the proxy's fastest contact node [m/s]: a brisk hand. Faster: the tangent is followed farther.
+/// Speed of the proxy's fastest contact node (m/s): a brisk hand. Faster: the tangent is followed farther.
 const SPEED: f64 = 0.2;
 
-/// Ticks from one solution to the next [1]: every tick where a solution takes less; the last is as late as the loop
+/// Ticks from one solution to the next (1): every tick where a solution takes less; the last is as late as the loop
 /// takes one.
 const INTERVALS: [u64; 4] = [1, 2, 4, 8];
 
 /// Seed of the directions.
 const SEED: u64 = 24;
 
-/// Way of one tick that ends at `q`, along random joint rates [rad or m].
+/// Way of one tick that ends at `q`, along random joint rates (rad or m).
 fn way(chain: &Chain, q: &JointVector, period: f64, random: &mut Random) -> JointVector {
     let mut rates = JointVector::zeros(q.len());
     rates.iter_mut().for_each(|rate| *rate = random.between(-1.0, 1.0));
@@ -50,7 +50,7 @@ fn ago(q: &JointVector, way: &JointVector, ticks: u64) -> Whereabouts {
     at
 }
 
-/// The last solution before each of `places`, with one every `interval` ticks, and the mean time of one in contact [s].
+/// The last solution before each of `places`, with one every `interval` ticks, and the mean time of one in contact (s).
 fn solutions(model: &Model<'_>, places: &[JointVector], ways: &[JointVector], interval: u64) -> (Vec<Solution>, f64) {
     let (mut spent, mut contacts) = (0.0, 0_u32);
     let mut solve = |(number, (q, way)): (u64, (&JointVector, &JointVector))| {

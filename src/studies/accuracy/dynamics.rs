@@ -32,7 +32,7 @@ const LET_GO: u32 = 3;
 /// Iterations of conjugate gradients a frame.
 const ITERATIONS: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 
-/// The object at one instant: displacements [m] and energy [J].
+/// The object at one instant: displacements (m) and energy (J).
 type Seen = (Vec<DVec3>, f64);
 
 /// The grid point of the greatest stored energy.
@@ -45,7 +45,7 @@ pub(super) fn deepest(own: &Dataset) -> usize {
 struct Push<'a> {
     object: &'a Object,
     effects: GraphicsEffects,
-    /// Frames a second, as the scene says [Hz].
+    /// Frames a second, as the scene says (Hz).
     rate: f64,
     forces: Vec<DVec3>,
     none: Vec<DVec3>,

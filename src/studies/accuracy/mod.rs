@@ -71,11 +71,11 @@ pub enum Study {
 /// Ratio of times, with the spread of the runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Cost {
-    /// Median of the runs [1].
+    /// Median of the runs (1).
     pub median: f64,
-    /// [1]
+    /// (1)
     pub least: f64,
-    /// [1]
+    /// (1)
     pub greatest: f64,
 }
 
@@ -95,7 +95,7 @@ pub struct Row {
     /// Grid points in contact that were solved: a free one costs a distance, however the grid is made. 0 in other
     /// studies.
     pub solved: usize,
-    /// Size of the dataset; 0 where there is none [bytes].
+    /// Size of the dataset; 0 where there is none (bytes).
     pub bytes: usize,
     /// Time, relative to the least of the study's baseline.
     pub cost: Cost,
@@ -114,9 +114,9 @@ pub struct Row {
 pub struct Loops {
     /// Interpolation.
     pub series: String,
-    /// Side of the square loop [rad or m].
+    /// Side of the square loop (rad or m).
     pub side: f64,
-    /// Root mean square of the work around the loop [J].
+    /// Root mean square of the work around the loop (J).
     pub work: f64,
 }
 
@@ -133,9 +133,9 @@ pub struct Accuracy {
     pub in_contact: usize,
     /// Left out, because the reference itself did not converge there.
     pub left_out: usize,
-    /// Root mean square of the reference torque [N m].
+    /// Root mean square of the reference torque (N m).
     pub torque: f64,
-    /// Error of the reference itself, rms [N m].
+    /// Error of the reference itself, rms (N m).
     pub reference_error: f64,
     /// Joints.
     pub joints: usize,
@@ -145,11 +145,11 @@ pub struct Accuracy {
     pub points: usize,
     /// Unit of spacings: `rad`, `m`, or `rad, m` where joints of both kinds mix.
     pub unit: &'static str,
-    /// Greatest energy of the scene's own dataset [J].
+    /// Greatest energy of the scene's own dataset (J).
     pub greatest_energy: f64,
-    /// Time of a look-up by `linear`, to which those of the others are relative [s].
+    /// Time of a look-up by `linear`, to which those of the others are relative (s).
     pub look_up: f64,
-    /// Time of an equilibrium in contact along a way, solved warm with its tangent [s].
+    /// Time of an equilibrium in contact along a way, solved warm with its tangent (s).
     pub solution: f64,
     /// Study by study.
     pub rows: Vec<Row>,
@@ -269,7 +269,7 @@ fn unit(scene: &Scene) -> &'static str {
     }
 }
 
-/// Median time of `rounds` runs of `work`, with least and greatest [s], and the last result.
+/// Median time of `rounds` runs of `work`, with least and greatest (s), and the last result.
 fn timed<T, E>(rounds: usize, mut work: impl FnMut() -> Result<T, E>) -> Result<(Cost, T), E> {
     let mut run = || {
         let start = Instant::now();
@@ -297,7 +297,7 @@ impl Cost {
         }
     }
 
-    /// Relative to `baseline` [s].
+    /// Relative to `baseline` (s).
     fn over(self, baseline: f64) -> Self {
         let baseline = baseline.max(f64::MIN_POSITIVE);
         Self { median: self.median / baseline, least: self.least / baseline, greatest: self.greatest / baseline }

@@ -205,7 +205,7 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
 }
 
 /// The smallest error on offer, where smaller ones were asked for in vain; the greatest that was asked for, where there
-/// is no offer at all [1].
+/// is no offer at all (1).
 fn unreached(accuracy: &Accuracy) -> Option<f64> {
     let offers = offers(accuracy);
     let least = offers.iter().map(|offer| offer.target).fold(TARGETS[0], f64::min);

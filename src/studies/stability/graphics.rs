@@ -15,11 +15,11 @@ use crate::{
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Energy that the object may seem to gain in a frame from nowhere, over the most that it stored [1]: sums over up to
+/// Energy that the object may seem to gain in a frame from nowhere, over the most that it stored (1): sums over up to
 /// 1e5 coordinates, each rounded by eps, of terms that cancel.
 const FRAME_ENERGY_ROUNDING: f64 = 1e-10;
 
-/// The same where the state is f32 [1]: each displacement and velocity is rounded by 6e-8, and energy is their square.
+/// The same where the state is f32 (1): each displacement and velocity is rounded by 6e-8, and energy is their square.
 const GPU_FRAME_ENERGY_ROUNDING: f64 = 1e-6;
 
 /// The cases of this file.
@@ -29,7 +29,7 @@ pub(super) const CASES: [Case; 3] = [
     Case { room: "graphics", name: "solver cut short on the GPU", run: cut_short },
 ];
 
-/// Times between frames T [s].
+/// Times between frames T (s).
 const PERIODS: [f64; 4] = [1e-3, 1.0 / 60.0, 0.1, 1.0];
 
 const EARTH: DVec3 = DVec3::new(0.0, 0.0, -9.81);
@@ -51,7 +51,7 @@ fn frames(effort: Effort) -> (usize, usize) {
     if effort == Effort::Sample { (60, 20) } else { (600, 200) }
 }
 
-/// Forces that strain the springs by about `strain`, and differ from frame to frame as contact that chatters does [N].
+/// Forces that strain the springs by about `strain`, and differ from frame to frame as contact that chatters does (N).
 fn push(object: &Object, frame: usize, size: f64) -> Vec<DVec3> {
     let force = |k: usize| size * DVec3::new(0.1, 0.02 * (k % 3) as f64, -(((k + 3 * frame) % 7) as f64));
     (0..object.rest.len()).map(force).collect()

@@ -23,19 +23,19 @@ pub struct Solution {
     pub number: u64,
     /// Tick for which it was solved.
     pub tick: u64,
-    /// Configuration [rad or m].
+    /// Configuration (rad or m).
     pub place: JointVector,
     /// Status.
     pub status: Status,
-    /// Contact torque [N m or N].
+    /// Contact torque (N m or N).
     pub torque: JointVector,
-    /// Stored energy U [J].
+    /// Stored energy U (J).
     pub energy: f64,
-    /// Tangent d tau/d q; zeros where there is none [N m/rad].
+    /// Tangent d tau/d q; zeros where there is none (N m/rad).
     pub tangent: JointMatrix,
     /// Nodes of the object in contact.
     pub contact_nodes: u32,
-    /// Forces on the proxy's nodes that are touched [N]; none unless they are asked for.
+    /// Forces on the proxy's nodes that are touched (N); none unless they are asked for.
     pub on_proxy: Vec<NodeForce>,
 }
 
@@ -65,7 +65,7 @@ impl Solution {
         }
     }
 
-    /// Torque [N m or N] and energy [J] at `q`, to second order of the energy: `tau + K dq` and `U - tau . dq - dq . K
+    /// Torque (N m or N) and energy (J) at `q`, to second order of the energy: `tau + K dq` and `U - tau . dq - dq . K
     /// dq / 2`, and nothing where the root `sqrt(2 U)`, to first order, is negative: there contact has ended.
     #[must_use]
     pub fn at(&self, q: &JointVector) -> (JointVector, f64) {

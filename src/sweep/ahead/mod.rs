@@ -33,7 +33,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How far ahead the base is solved [s]. Longer: more is solved that is never felt. Shorter: a hand that speeds up is
+/// How far ahead the base is solved (s). Longer: more is solved that is never felt. Shorter: a hand that speeds up is
 /// not kept up with.
 const AHEAD: f64 = 0.4;
 
@@ -50,9 +50,9 @@ const IDLE: Duration = Duration::from_micros(500);
 /// Where the proxy is and goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Whereabouts {
-    /// At the next tick [rad or m].
+    /// At the next tick (rad or m).
     pub position: JointVector,
-    /// [rad/s or m/s]
+    /// (rad/s or m/s)
     pub velocity: JointVector,
     /// Number of that tick.
     pub tick: u64,

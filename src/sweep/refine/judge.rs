@@ -38,19 +38,19 @@ impl Judge {
         2 * (self.0.places.len() + self.0.left_out)
     }
 
-    /// Mean number of the object's nodes with a contact force, of all configurations [1].
+    /// Mean number of the object's nodes with a contact force, of all configurations (1).
     #[must_use]
     pub fn mean_forces(&self) -> f64 {
         self.0.mean_forces
     }
 
-    /// Rms of the torque [N m].
+    /// Rms of the torque (N m).
     #[must_use]
     pub fn torque(&self) -> f64 {
         self.0.torque
     }
 
-    /// Rms error of the torque that `answer` gives, over the rms of the torque [1].
+    /// Rms error of the torque that `answer` gives, over the rms of the torque (1).
     pub fn relative_error(&self, answer: impl FnMut(&JointVector) -> JointVector) -> f64 {
         self.0.errors(answer).0 / self.0.torque
     }

@@ -41,15 +41,15 @@ use crate::{
 use nodebook::{HeldNodes, Nodebook, held_bytes};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// Standard deviations by which the measured squared error is to be below the aim's [1]. Larger: more nodes. Smaller:
+/// Standard deviations by which the measured squared error is to be below the aim's (1). Larger: more nodes. Smaller:
 /// other configurations see a larger error more often.
 const CONFIDENCE: f64 = 1.0;
 
-/// Nodes that a round adds at least, over those that are there [1]. Larger: more nodes than needed. Smaller: more
+/// Nodes that a round adds at least, over those that are there (1). Larger: more nodes than needed. Smaller: more
 /// rounds.
 const GROWTH: f64 = 0.05;
 
-/// Ratio of the squared errors of two levels [1]: kinks of the torque, which are left when smooth errors have fallen,
+/// Ratio of the squared errors of two levels (1): kinks of the torque, which are left when smooth errors have fallen,
 /// err by h in a share h of the volume.
 const FALL: f64 = 0.125;
 
@@ -63,11 +63,11 @@ pub struct Refine<'a> {
     pub levels: u32,
     /// How it is to interpolate.
     pub order: Order,
-    /// Rms error of the torque, over the rms of the torque [1].
+    /// Rms error of the torque, over the rms of the torque (1).
     pub aim: f64,
     /// Most nodes that are solved.
     pub most: usize,
-    /// Configurations for one call of the backend [1]; results do not depend on it.
+    /// Configurations for one call of the backend (1); results do not depend on it.
     pub batch: usize,
 }
 
@@ -83,7 +83,7 @@ pub struct Refined {
     pub equilibria: usize,
     /// Nodes solved, all rounds; some may be left out of the store.
     pub solved: usize,
-    /// Rms error at the configurations by which the filling was stopped, over the rms torque [1].
+    /// Rms error at the configurations by which the filling was stopped, over the rms torque (1).
     pub measured: f64,
     /// Rounds.
     pub rounds: usize,
@@ -143,7 +143,7 @@ impl Refine<'_> {
     }
 
     /// Memory that `nodes` nodes take beside their store while it is filled, if contact has forces on so many of the
-    /// object's nodes as those of `judge` have [bytes].
+    /// object's nodes as those of `judge` have (bytes).
     #[must_use]
     pub fn filling_bytes(&self, nodes: usize, judge: &Judge) -> usize {
         (nodes as f64 * held_bytes(width(self.base.joints()), judge.mean_forces())).ceil() as usize
@@ -172,7 +172,7 @@ impl Refine<'_> {
 struct Leaf {
     level: u32,
     low: Place,
-    /// Expected contribution to the squared error, over the volume of a cell of the base [N^2 m^2].
+    /// Expected contribution to the squared error, over the volume of a cell of the base (N^2 m^2).
     square: f64,
 }
 
@@ -183,7 +183,7 @@ struct Filling<'a, B> {
     /// The nodes of each level.
     nodes: Vec<BTreeSet<Place>>,
     leaves: Vec<Leaf>,
-    /// Squared errors that the levels below had at solved nodes [N^2 m^2].
+    /// Squared errors that the levels below had at solved nodes (N^2 m^2).
     squares: HashMap<(u32, Place), f64>,
 }
 
@@ -212,7 +212,7 @@ impl<B: Backend> Filling<'_, B> {
         }
     }
 
-    /// Rms of the torque at the corners of a cell of the base [N m].
+    /// Rms of the torque at the corners of a cell of the base (N m).
     fn torque(&self, low: &Place) -> f64 {
         let corners = 1_usize << self.book.nodes.space.joints();
         let solved = (0..corners).filter_map(|set| self.book.nodes.get(0, &corner(low, set)));
@@ -224,7 +224,7 @@ impl<B: Backend> Filling<'_, B> {
     }
 
     /// Squared distance of the torque that `store` gives at a solved node from the solved one; zero where that did not
-    /// converge [N^2 m^2].
+    /// converge (N^2 m^2).
     fn square(&self, store: &Store, level: u32, node: &Place) -> f64 {
         let nodes = &self.book.nodes;
         let Some(held) = nodes.get(level, node) else { return 0.0 };

@@ -31,11 +31,11 @@ pub(super) type Point = (u32, Place);
 /// A node that is solved.
 pub(super) struct Held {
     pub node: Solved,
-    /// Contact forces on the object's nodes, ascending by node [N].
+    /// Contact forces on the object's nodes, ascending by node (N).
     forces: Vec<(u32, Vec3)>,
 }
 
-/// Memory of a node that is held, with its record and forces on `forces` nodes of the object [bytes].
+/// Memory of a node that is held, with its record and forces on `forces` nodes of the object (bytes).
 pub(super) fn held_bytes(record: usize, forces: f64) -> f64 {
     let fixed = size_of::<(Point, Held)>() + record * size_of::<f32>();
     // Tables grow by doubling.
@@ -53,7 +53,7 @@ pub(super) struct HeldNodes {
     pub space: Space,
     scale: Scale,
     held: HashMap<Point, Held>,
-    /// Status and energy from rest of those that were lowered [J].
+    /// Status and energy from rest of those that were lowered (J).
     from_rest: HashMap<Point, (Status, f64)>,
 }
 

@@ -162,7 +162,7 @@ pub unsafe extern "C" fn stand_in_log(text: *mut u8, room: usize) -> usize {
     count
 }
 
-/// Size of the force on the device [N].
+/// Size of the force on the device (N).
 #[unsafe(no_mangle)]
 pub extern "C" fn stand_in_effort() -> f64 {
     STATE.lock().unwrap().force.iter().map(|f| f * f).sum::<f64>().sqrt()

@@ -278,7 +278,7 @@ pub unsafe extern "C" fn stand_in_log(text: *mut u8, room: usize) -> usize {
     count
 }
 
-/// Size of the torque on the device [N m].
+/// Size of the torque on the device (N m).
 #[unsafe(no_mangle)]
 pub extern "C" fn stand_in_effort() -> f64 {
     lock().torque.iter().map(|f| f * f).sum::<f64>().sqrt()

@@ -31,15 +31,15 @@ const EXECUTIONS: usize = 20_000;
 const LONGEST: Duration = Duration::from_secs(1);
 /// When an execution is taken for endless: its input is kept, and the process ends.
 const ENDLESS: Duration = Duration::from_secs(30);
-/// Most memory that an execution takes at once, on its thread [bytes].
+/// Most memory that an execution takes at once, on its thread (bytes).
 const MOST_BYTES: usize = 64 << 20;
-/// Longest input [bytes].
+/// Longest input (bytes).
 const LONGEST_INPUT: usize = 1 << 15;
 /// Most inputs of a target's corpus.
 const MOST_INPUTS: usize = 2000;
 
 thread_local! {
-    /// Memory that this thread has taken and not given back [bytes]; negative where others gave it theirs.
+    /// Memory that this thread has taken and not given back (bytes); negative where others gave it theirs.
     static TAKEN: Cell<isize> = const { Cell::new(0) };
     /// Greatest value of it.
     static PEAK: Cell<isize> = const { Cell::new(0) };

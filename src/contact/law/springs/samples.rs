@@ -82,7 +82,7 @@ impl Sample {
         self.contacts.iter().map(|contact| contact.force_over_kc() > 0.0).collect()
     }
 
-    /// `((1 + mu) K + B) C force`, `stiffening` being 1 + mu [N].
+    /// `((1 + mu) K + B) C force`, `stiffening` being 1 + mu (N).
     pub fn resist(&self, stiffening: f64, force: &[f64]) -> Vec<f64> {
         let mut displacement = vec![0.0; force.len()];
         self.support.multiply(force, &mut displacement);

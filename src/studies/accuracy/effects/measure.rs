@@ -279,7 +279,7 @@ fn whole(scene: &Scene, can_act: &[Effect]) -> (bool, Vec<Effect>) {
 /// and whatever else a machine does only adds to it.
 const TRIES: usize = 3;
 
-/// Time that the frames of one run take, about [s]: with all variants, rounds and tries there are some hundred runs.
+/// Time that the frames of one run take, about (s): with all variants, rounds and tries there are some hundred runs.
 const FRAMES_TIME: f64 = 0.2;
 
 /// Ticks of a block: a tenth of a millisecond, which is mostly not interrupted, and long enough for any clock.

@@ -32,9 +32,9 @@ pub struct Costs {
     pub frame: Option<Cost>,
     /// A frame on the GPU; none without graphics or without an adapter.
     pub gpu_frame: Option<Cost>,
-    /// GPU memory; none where the baseline takes nothing [1].
+    /// GPU memory; none where the baseline takes nothing (1).
     pub device: Option<f64>,
-    /// Size of the dataset without the scene's text [1].
+    /// Size of the dataset without the scene's text (1).
     pub dataset: f64,
 }
 
@@ -58,9 +58,9 @@ pub struct Price {
     pub alone: Costs,
     /// For an effect: the whole scene with it over the whole without it; absent if they cannot act together.
     pub within: Option<Costs>,
-    /// GPU memory of the graphics [bytes]: zero without graphics, absent without an adapter.
+    /// GPU memory of the graphics (bytes): zero without graphics, absent without an adapter.
     pub device: Option<FrameCost>,
-    /// Size of the dataset without the scene's text [B].
+    /// Size of the dataset without the scene's text (B).
     pub dataset_bytes: usize,
 }
 
@@ -75,13 +75,13 @@ impl Price {
 /// Cost of the baselines themselves, minimum of the rounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Baseline {
-    /// Haptization of the plain scene [s].
+    /// Haptization of the plain scene (s).
     pub bake: f64,
-    /// A tick of it [s].
+    /// A tick of it (s).
     pub tick: f64,
-    /// A frame on the CPU [s].
+    /// A frame on the CPU (s).
     pub frame: f64,
-    /// A frame on the GPU [s]; none without an adapter.
+    /// A frame on the GPU (s); none without an adapter.
     pub gpu_frame: Option<f64>,
 }
 
@@ -94,7 +94,7 @@ pub struct Effects {
     pub rounds: usize,
     /// The baseline of the relative costs.
     pub baseline: Baseline,
-    /// Share of the ticks in contact, in the plain scene [1].
+    /// Share of the ticks in contact, in the plain scene (1).
     pub in_contact: f64,
     /// Nodes of the object that is drawn.
     pub nodes: usize,

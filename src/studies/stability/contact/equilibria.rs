@@ -26,14 +26,14 @@ const FINE: usize = 256;
 /// Starts of the independent search, beside those from neighbours.
 const ELSEWHERE: usize = 5;
 
-/// Energy, relative, by which another equilibrium counts as lower [1]: the searches end at a residual of 1e-8, whose
+/// Energy, relative, by which another equilibrium counts as lower (1): the searches end at a residual of 1e-8, whose
 /// square it errs by.
 const LOWER: f64 = 1e-6;
 
-/// Greatest jump of U over the work of one grid step [1].
+/// Greatest jump of U over the work of one grid step (1).
 const JUMP: f64 = 0.01;
 
-/// Least share of configurations whose equilibrium from rest is the lowest found [1].
+/// Least share of configurations whose equilibrium from rest is the lowest found (1).
 const LOWEST: f64 = 0.995;
 
 /// Both measures.
@@ -57,7 +57,7 @@ pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
 struct Space<'a> {
     model: &'a Model<'a>,
     all: &'a [JointVector],
-    /// Step of each axis [rad].
+    /// Step of each axis (rad).
     steps: Vec<f64>,
 }
 
@@ -159,7 +159,7 @@ impl Space<'_> {
 }
 
 /// Returns by how much U changes between two configurations beside the work of the torque, by the trapezoidal rule;
-/// where one is flagged there is no telling [J].
+/// where one is flagged there is no telling (J).
 fn unexplained((from, before): &(Vec<f64>, Equilibrium), (to, after): &(Vec<f64>, Equilibrium)) -> f64 {
     if before.status.is_failed() || after.status.is_failed() {
         return 0.0;

@@ -12,7 +12,7 @@ use crate::{
     contact::{Equilibrium, Model, Status},
 };
 
-/// How far a unit normal's end moves from facet to facet of the sphere, 36 degrees apart at most: 2 sin 18 degrees [1].
+/// How far a unit normal's end moves from facet to facet of the sphere, 36 degrees apart at most: 2 sin 18 degrees (1).
 const TURN: f64 = 0.62;
 
 /// Configurations of a path from `a` to `b`.
@@ -25,7 +25,7 @@ fn path(a: &JointVector, b: &JointVector, steps: usize) -> Vec<JointVector> {
     (0..=steps).map(between).collect()
 }
 
-/// Largest change of tau in a step of a path, and the largest tau [N m]; steps at flagged points are left out, and
+/// Largest change of tau in a step of a path, and the largest tau (N m); steps at flagged points are left out, and
 /// counted.
 fn largest_step(path: &[Equilibrium]) -> (f64, f64, usize) {
     let torque = |result: &Equilibrium| (result.status != Status::Unconverged).then_some(result.torque);
@@ -41,7 +41,7 @@ fn largest_step(path: &[Equilibrium]) -> (f64, f64, usize) {
     (largest, size, path.iter().filter(|result| torque(result).is_none()).count())
 }
 
-/// A measurement with nodes of one kind: their name, radius [m] and Kc [N/m].
+/// A measurement with nodes of one kind: their name, radius (m) and Kc (N/m).
 type Measure = fn(Effort, Processor<'_>, &str, f64, f64) -> Result<CaseResult, Failure>;
 
 /// `measure` of balls and points, soft and stiff.
@@ -115,7 +115,7 @@ pub fn curl(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     of_each(against_energy, setting)
 }
 
-/// Half the width of a stencil [m or rad].
+/// Half the width of a stencil (m or rad).
 const STENCIL: f64 = 1e-6;
 
 /// Returns how far a configuration's torque is from the slope of U, relative: of it, and of those a step before and

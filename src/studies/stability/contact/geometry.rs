@@ -12,7 +12,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Contact stiffnesses at which the arrangements are tried [N/m].
+/// Contact stiffnesses at which the arrangements are tried (N/m).
 const STIFFNESSES: [f64; 3] = [1e2, 1e4, f64::INFINITY];
 
 fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: Bound, note: String) -> CaseResult {

@@ -12,7 +12,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Where the base stands [m]: its links reach the sphere stretched out, a little off the plane in which its edges lie.
+/// Where the base stands (m): its links reach the sphere stretched out, a little off the plane in which its edges lie.
 const BASE: DVec3 = DVec3::new(-0.2, 0.003, 0.04);
 
 /// A singular pose: its name, the joints, and their coordinates when the links are turned by an angle.

@@ -41,7 +41,7 @@ impl<'a> Processor<'a> {
         if self.gpu.is_some() { gpu } else { cpu }
     }
 
-    /// Largest relative residual of what is called converged [1].
+    /// Largest relative residual of what is called converged (1).
     pub fn residual(&self) -> f64 {
         self.choose(1e-6, 1e-4)
     }

@@ -12,7 +12,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Depths of the configurations [m].
+/// Depths of the configurations (m).
 const DEPTH: f64 = 0.2 * RADIUS;
 
 fn outcome(case: &str, varied: &str, measure: &str, worst: f64, bound: f64, note: String) -> CaseResult {

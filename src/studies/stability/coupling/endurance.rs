@@ -33,7 +33,7 @@ pub(super) fn rest(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     Ok(outcomes)
 }
 
-/// Motion of a device at rest [rad]: a hundredth of the finest encoder's step.
+/// Motion of a device at rest (rad): a hundredth of the finest encoder's step.
 const STILL: f64 = 1e-7;
 
 pub(super) fn stick_slip(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {

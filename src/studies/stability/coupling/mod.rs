@@ -57,17 +57,17 @@ struct Watch {
     torque: f64,
     /// Worst of all runs, each over the energy that it exchanged.
     residual: f64,
-    /// Greatest residual of the present run, and the energy that it has exchanged so far [J].
+    /// Greatest residual of the present run, and the energy that it has exchanged so far (J).
     run: [f64; 2],
     given: f64,
-    /// At the object's port, beyond what the controller took there [J].
+    /// At the object's port, beyond what the controller took there (J).
     created: f64,
-    /// Most that the torque held over one tick could have given: the greatest torque along the way of the device [J].
+    /// Most that the torque held over one tick could have given: the greatest torque along the way of the device (J).
     hold: f64,
     device: Option<JointVector>,
     finite: bool,
     ended: Option<(Fault, f64)>,
-    /// Torques after faults, at the ends of runs [N m].
+    /// Torques after faults, at the ends of runs (N m).
     left: f64,
     faults: Vec<Fault>,
     runs: usize,
@@ -177,7 +177,7 @@ fn presses(setup: &Setup, seconds: f64) -> Result<SimulatedHand, Failure> {
     way(setup, &places)
 }
 
-/// `count` ticks of `setup` with `device`; `time(k)` is T_k [s].
+/// `count` ticks of `setup` with `device`; `time(k)` is T_k (s).
 fn drive(
     setup: &Setup,
     device: &mut dyn Device,
