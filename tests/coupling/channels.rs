@@ -36,7 +36,7 @@ fn a_press_and_scrape_in_a_simulated_hand_is_calm_balanced_and_ends() {
         let summary = trace.summary();
         assert_eq!(summary.faults, 0, "{spec}: {:?}", trace.ticks.last());
         assert!(summary.max_relative_account_residual < 1e-11, "{spec}: {summary:?}");
-        assert!(summary.max_contact_torque > 2.0, "{spec}: {summary:?}");
+        assert!(summary.max_contact_force > 2.0, "{spec}: {summary:?}");
         let last = trace.ticks.last().unwrap();
         assert!(last.device_torque.norm() < 1e-3 && last.accounts.kinetic < 1e-9, "{spec}: {last:?}");
     }
