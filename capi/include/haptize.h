@@ -199,13 +199,13 @@ hz_code hz_field_torque(const struct hz_field *field, const double *q, double *t
 hz_code hz_field_sample(const struct hz_field *field, const double *q, struct hz_sample *sample);
 
 // Looks up `count` torques on all cores: row k of `tau` at row k of `q`, rows of one entry per joint. `status`, which
-// may be NULL, is told the status of each, as hz_sample has it. Not for the real-time thread.
+// may be NULL, is told the status of each, as hz_sample has it. `tau` may be `q`. Not for the real-time thread.
 //
 // Returns HZ_OK; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for all torques.
 //
 // Pointers:
-// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries. They
-// do not overlap.
+// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries, and
+// overlaps neither.
 hz_code hz_field_torques(const struct hz_field *field, size_t count, const double *q, double *tau, uint8_t *status);
 
 // Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the

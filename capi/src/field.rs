@@ -2,10 +2,10 @@
 
 use crate::{
     HZ_MAX_JOINTS,
-    outcome::{self, Extensible, guarded, hz_code},
+    outcome::{self, Extensible, Told, guarded, hz_code},
 };
 use haptize::{JointVector, contact::Status, dataset::Dataset, field::TorqueField, render::setup};
-use std::ffi::c_char;
+use std::{ffi::c_char, mem::offset_of};
 
 /// The torque field of a dataset. Any number of threads may look it up at once.
 pub struct hz_field {
@@ -33,7 +33,9 @@ pub struct hz_sample {
 }
 
 // SAFETY: it begins with its size.
-unsafe impl Extensible for hz_sample {}
+unsafe impl Extensible for hz_sample {
+    const FIRST_SIZE: usize = offset_of!(Self, contact_nodes) + size_of::<u32>();
+}
 
 /// Opens the dataset file at `path` (UTF-8) and makes the field of it in memory as its scene has it felt; without a
 /// scene it is interpolated linearly. The file is checked in full, and not needed afterwards.
@@ -94,14 +96,11 @@ pub unsafe extern "C" fn hz_field_bounds(field: *const hz_field, least: *mut f64
     // SAFETY: as the caller promises.
     let Some(field) = (unsafe { field.as_ref() }) else { return hz_code::HZ_ARGUMENT };
     let joints = field.least.len();
-    // SAFETY: as the caller promises.
-    let (Some(to_least), Some(to_greatest)) =
-        (unsafe { (outcome::slice_mut(least, joints), outcome::slice_mut(greatest, joints)) })
-    else {
-        return hz_code::HZ_ARGUMENT;
-    };
-    to_least.copy_from_slice(&field.least);
-    to_greatest.copy_from_slice(&field.greatest);
+    for (place, ends) in [(least, &field.least), (greatest, &field.greatest)] {
+        // SAFETY: as the caller promises.
+        let Some(out) = (unsafe { outcome::slice_mut(place, joints) }) else { return hz_code::HZ_ARGUMENT };
+        out.copy_from_slice(ends);
+    }
     hz_code::HZ_OK
 }
 
@@ -141,28 +140,34 @@ pub unsafe extern "C" fn hz_field_torque(field: *const hz_field, q: *const f64, 
 pub unsafe extern "C" fn hz_field_sample(field: *const hz_field, q: *const f64, sample: *mut hz_sample) -> hz_code {
     guarded(|| {
         // SAFETY: as the caller promises.
-        let (Some(field), Some(out)) = (unsafe { (field.as_ref(), outcome::structure(sample)) }) else {
+        let (Some(field), Some(out)) = (unsafe { (field.as_ref(), Told::new(sample)) }) else {
             return hz_code::HZ_ARGUMENT;
         };
-        *out = hz_sample { size: out.size, ..hz_sample::default() };
-        // SAFETY: as the caller promises.
-        let Some(q) = (unsafe { configuration(q, field.field.joints()) }) else { return hz_code::HZ_ARGUMENT };
-        let sample = field.field.sample(&q);
-        out.torque = sample.torque.padded();
-        (out.energy, out.index) = (sample.energy, sample.index);
-        (out.status, out.contact_nodes) = (sample.status() as u32, sample.contact_nodes);
-        code(sample.status())
+        // SAFETY: as the caller promises. `q` is copied before anything is written: it may lie within the sample.
+        let q = unsafe { configuration(q, field.field.joints()) };
+        let found = q.map(|q| field.field.sample(&q));
+        let told = found.as_ref().map_or_else(hz_sample::default, |found| hz_sample {
+            size: 0,
+            torque: found.torque.padded(),
+            energy: found.energy,
+            index: found.index,
+            status: found.status() as u32,
+            contact_nodes: found.contact_nodes,
+        });
+        // SAFETY: as the caller promises; nothing borrows `q` any more.
+        unsafe { out.write(&told) };
+        found.map_or(hz_code::HZ_ARGUMENT, |found| code(found.status()))
     })
 }
 
 /// Looks up `count` torques on all cores: row k of `tau` at row k of `q`, rows of one entry per joint. `status`, which
-/// may be NULL, is told the status of each, as hz_sample has it. Not for the real-time thread.
+/// may be NULL, is told the status of each, as hz_sample has it. `tau` may be `q`. Not for the real-time thread.
 ///
 /// Returns HZ_OK; HZ_ARGUMENT for NULL or a `q` that is not finite, with zeros for all torques.
 ///
 /// # Safety
-/// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries. They
-/// do not overlap.
+/// `field` is NULL or open; `q` and `tau` are NULL or have `count` rows, `status` is NULL or has `count` entries, and
+/// overlaps neither.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_field_torques(
     field: *const hz_field,
@@ -179,12 +184,16 @@ pub unsafe extern "C" fn hz_field_torques(
             return hz_code::HZ_OK;
         }
         // SAFETY: as the caller promises.
+        let mut q = unsafe { outcome::slice(q, entries) };
+        let copy = q.filter(|q| overlap(q.as_ptr(), tau, entries)).map(<[f64]>::to_vec);
+        if copy.is_some() {
+            q = copy.as_deref();
+        }
+        // SAFETY: as the caller promises; `q` lies elsewhere.
         let Some(tau) = (unsafe { outcome::slice_mut(tau, entries) }) else { return hz_code::HZ_ARGUMENT };
         tau.fill(0.0);
         // SAFETY: as the caller promises.
-        let (Some(q), status) = (unsafe { (outcome::slice(q, entries), outcome::slice_mut(status, count)) }) else {
-            return hz_code::HZ_ARGUMENT;
-        };
+        let (Some(q), status) = (q, unsafe { outcome::slice_mut(status, count) }) else { return hz_code::HZ_ARGUMENT };
         match field.field.torques(q, tau, status) {
             Ok(()) => hz_code::HZ_OK,
             Err(_) => hz_code::HZ_ARGUMENT,
@@ -200,6 +209,11 @@ pub unsafe fn configuration(q: *const f64, joints: usize) -> Option<JointVector>
     // SAFETY: as the caller promises.
     let q = JointVector::from_slice(unsafe { outcome::slice(q, joints) }?);
     q.is_finite().then_some(q)
+}
+
+/// Whether `entries` numbers at `a` and at `b` have some in common.
+fn overlap(a: *const f64, b: *const f64, entries: usize) -> bool {
+    a.addr().abs_diff(b.addr()) < entries * size_of::<f64>()
 }
 
 fn code(status: Status) -> hz_code {

@@ -3,7 +3,7 @@
 use crate::{
     HZ_MAX_JOINTS,
     field::configuration,
-    outcome::{self, Extensible, Failure, argument, guarded, hz_code, write_text},
+    outcome::{self, Extensible, Failure, Told, argument, guarded, hz_code, write_text},
 };
 use haptize::{
     JointVector,
@@ -14,7 +14,7 @@ use haptize::{
     },
     scene::HapticsSpec,
 };
-use std::{ffi::c_char, sync::Arc};
+use std::{ffi::c_char, mem::offset_of, sync::Arc};
 
 /// A haptic loop: the virtual proxy, its coupling to the device, the torque field, and the watchdog. One thread at a
 /// time may use it.
@@ -60,9 +60,13 @@ pub struct hz_tick {
 }
 
 // SAFETY: both begin with their size.
-unsafe impl Extensible for hz_gains {}
+unsafe impl Extensible for hz_gains {
+    const FIRST_SIZE: usize = offset_of!(Self, torque_limit) + size_of::<[f64; HZ_MAX_JOINTS]>();
+}
 // SAFETY: as above.
-unsafe impl Extensible for hz_tick {}
+unsafe impl Extensible for hz_tick {
+    const FIRST_SIZE: usize = offset_of!(Self, flags) + size_of::<u32>();
+}
 
 /// Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the
 /// scene's where that is not NULL. The file is not needed afterwards.
@@ -88,11 +92,11 @@ pub unsafe extern "C" fn hz_loop_open(
         let (haptics, advice) = if gains.is_null() {
             (setup.haptics.clone(), setup.advice)
         } else {
-            // SAFETY: as the caller promises; it is read only.
-            let gains = unsafe { outcome::structure(gains.cast_mut()) };
+            // SAFETY: as the caller promises.
+            let gains = unsafe { outcome::given(gains) };
             let gains = gains.ok_or_else(|| argument("gains.size is not sizeof(hz_gains)"))?;
             let mut spec = setup.scene.haptics.clone();
-            take(gains, &mut spec)?;
+            take(&gains, &mut spec)?;
             let (haptics, advice) = setup.retuned(&dataset, &spec)?;
             (Arc::new(haptics), advice)
         };
@@ -205,7 +209,7 @@ pub unsafe extern "C" fn hz_loop_tick(
         let Some(tau) = (unsafe { outcome::slice_mut(tau, joints) }) else { return hz_code::HZ_ARGUMENT };
         tau.fill(0.0);
         // SAFETY: as the caller promises.
-        let (Some(position), info) = (y, unsafe { outcome::structure(tick) }) else { return hz_code::HZ_ARGUMENT };
+        let (Some(position), info) = (y, unsafe { Told::new(tick) }) else { return hz_code::HZ_ARGUMENT };
         if !of.started || (info.is_none() && !tick.is_null()) {
             return hz_code::HZ_ARGUMENT;
         }
@@ -213,14 +217,16 @@ pub unsafe extern "C" fn hz_loop_tick(
         let output = of.haptics.tick(&mut of.state, &inputs);
         tau.copy_from_slice(&output.torque);
         if let Some(info) = info {
-            *info = hz_tick {
-                size: info.size,
+            let told = hz_tick {
+                size: 0,
                 proxy: output.proxy.padded(),
                 contact_torque: output.sample.torque.padded(),
                 energy: output.sample.energy,
                 contact: output.sample.contact.into(),
                 flags: output.flags.bits().into(),
             };
+            // SAFETY: as the caller promises.
+            unsafe { info.write(&told) };
         }
         if output.fault.is_some() { hz_code::HZ_LET_GO } else { hz_code::HZ_OK }
     })

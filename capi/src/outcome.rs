@@ -205,24 +205,70 @@ fn is_buffer<T>(numbers: *const T, count: usize) -> bool {
     !numbers.is_null() && numbers.is_aligned() && count <= isize::MAX as usize / size_of::<T>()
 }
 
-/// A structure whose first entry is its own size, by which a program compiled with a later header is known: such a one
-/// is only longer.
+/// A structure whose first entry is its own size. Later versions of the library only make it longer, so that its size
+/// tells with which header a program was compiled.
 ///
 /// # Safety
-/// The structure begins with a `usize`.
-pub unsafe trait Extensible: Sized {}
+/// The structure begins with a `usize`, and consists of numbers.
+pub unsafe trait Extensible: Copy + Default {
+    /// Size in the first header of this `HZ_ABI` (bytes): the end of the entry that was its last one.
+    const FIRST_SIZE: usize;
+}
 
-/// The structure at `structure`; `None` where it is NULL or its size is not told or too small.
+/// The size that the structure at `structure` tells; `None` where it is NULL or that is no size of such a structure.
 ///
 /// # Safety
-/// `structure` is NULL or points to a structure of the size that it tells, which nobody else writes while the result
-/// lives.
-pub unsafe fn structure<'a, T: Extensible>(structure: *mut T) -> Option<&'a mut T> {
+/// `structure` is NULL or points to a structure of the size that it tells.
+unsafe fn told_size<T: Extensible>(structure: *const T) -> Option<usize> {
     if structure.is_null() || !structure.is_aligned() {
         return None;
     }
     // SAFETY: the structure begins with its size.
     let size = unsafe { structure.cast::<usize>().read() };
-    // SAFETY: as the caller promises; the size was checked.
-    (size >= size_of::<T>()).then(|| unsafe { &mut *structure })
+    (size >= T::FIRST_SIZE).then_some(size)
+}
+
+/// A copy of the structure at `structure`, with the defaults of entries that an earlier header did not have; `None` where
+/// it is NULL or its size is not told or too small.
+///
+/// # Safety
+/// As for [`Told::new`]; nobody writes the structure meanwhile.
+pub unsafe fn given<T: Extensible>(structure: *const T) -> Option<T> {
+    // SAFETY: as the caller promises.
+    let size = unsafe { told_size(structure)? }.min(size_of::<T>());
+    let mut copy = T::default();
+    // SAFETY: so many bytes are there, and it consists of numbers.
+    unsafe { structure.cast::<u8>().copy_to_nonoverlapping((&raw mut copy).cast(), size) };
+    Some(copy)
+}
+
+/// A structure of the caller's that is to be told something. Nothing borrows it: it may lie where the arguments do.
+pub struct Told<T> {
+    place: *mut T,
+    size: usize,
+}
+
+impl<T: Extensible> Told<T> {
+    /// The structure at `structure`; `None` where it is NULL or its size is not told or too small.
+    ///
+    /// # Safety
+    /// `structure` is NULL or points to a structure of the size that it tells, which lives as long as the result.
+    pub unsafe fn new(structure: *mut T) -> Option<Self> {
+        // SAFETY: as the caller promises.
+        let size = unsafe { told_size(structure.cast_const())? };
+        Some(Self { place: structure, size })
+    }
+
+    /// Writes the entries of `value` that the caller's header has, but for the size, which stays.
+    ///
+    /// # Safety
+    /// Nobody else reads or writes the structure meanwhile.
+    pub unsafe fn write(&self, value: &T) {
+        let (first, end) = (size_of::<usize>(), self.size.min(size_of::<T>()));
+        // SAFETY: as the caller of `new` and of this promises; both begin with a size, which is left out.
+        unsafe {
+            let from = std::ptr::from_ref(value).cast::<u8>().add(first);
+            from.copy_to_nonoverlapping(self.place.cast::<u8>().add(first), end - first);
+        }
+    }
 }

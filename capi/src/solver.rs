@@ -3,7 +3,7 @@
 use crate::{
     HZ_MAX_JOINTS,
     field::configuration,
-    outcome::{self, Extensible, guarded, hz_code},
+    outcome::{self, Extensible, Told, guarded, hz_code},
 };
 use haptize::{
     JointVector,
@@ -11,7 +11,7 @@ use haptize::{
     scene::Scene,
     sweep::Direct,
 };
-use std::ffi::c_char;
+use std::{ffi::c_char, mem::offset_of};
 
 /// The object and the arm of a scene, ready to be solved at any configuration. Any number of threads may use it at
 /// once.
@@ -42,7 +42,9 @@ pub struct hz_equilibrium {
 }
 
 // SAFETY: it begins with its size.
-unsafe impl Extensible for hz_equilibrium {}
+unsafe impl Extensible for hz_equilibrium {
+    const FIRST_SIZE: usize = offset_of!(Self, forces) + size_of::<usize>();
+}
 
 /// The contact force on a node of the object.
 #[repr(C)]
@@ -116,16 +118,28 @@ pub unsafe extern "C" fn hz_solver_solve(
 ) -> hz_code {
     guarded(|| {
         // SAFETY: as the caller promises.
-        let (Some(solver), Some(out)) = (unsafe { (solver.as_ref(), outcome::structure(equilibrium)) }) else {
+        let (Some(solver), Some(out)) = (unsafe { (solver.as_ref(), Told::new(equilibrium)) }) else {
             return hz_code::HZ_ARGUMENT;
         };
-        *out = hz_equilibrium { size: out.size, ..hz_equilibrium::default() };
-        // SAFETY: as the caller promises.
-        let Some(q) = (unsafe { configuration(q, solver.direct.joints()) }) else { return hz_code::HZ_ARGUMENT };
+        // SAFETY: as the caller promises. `q` is copied before anything is written: it may lie within the equilibrium.
+        let Some(q) = (unsafe { configuration(q, solver.direct.joints()) }) else {
+            // SAFETY: as the caller promises.
+            unsafe { out.write(&hz_equilibrium::default()) };
+            return hz_code::HZ_ARGUMENT;
+        };
         let found = Solver::new(solver.direct.model()).solve(&q);
-        out.torque = JointVector::padded(&found.torque);
-        (out.energy, out.gap, out.residual) = (found.energy, found.gap, found.residual);
-        (out.status, out.iterations, out.forces) = (found.status as u32, found.iterations, found.forces.len());
+        let told = hz_equilibrium {
+            size: 0,
+            torque: JointVector::padded(&found.torque),
+            energy: found.energy,
+            gap: found.gap,
+            residual: found.residual,
+            status: found.status as u32,
+            iterations: found.iterations,
+            forces: found.forces.len(),
+        };
+        // SAFETY: as the caller promises; nothing borrows `q` any more.
+        unsafe { out.write(&told) };
         // SAFETY: as the caller promises.
         if let Some(forces) = unsafe { outcome::slice_mut(forces, room) } {
             for (to, from) in forces.iter_mut().zip(&found.forces) {

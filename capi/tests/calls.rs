@@ -75,6 +75,11 @@ fn look_ups_are_those_of_the_library_and_allocate_nothing() {
         let again = assert_no_alloc(|| unsafe { hz_field_sample(opened, q.as_ptr(), &raw mut sample) });
         assert_eq!((again, sample.status), (code, expected.status() as u32));
         assert_eq!((&sample.torque[..2], sample.energy), (&tau[..], expected.energy));
+        // The configuration may lie within the sample.
+        sample.torque[..2].copy_from_slice(&q);
+        let place = &raw mut sample;
+        assert_eq!(unsafe { hz_field_sample(opened, (&raw const (*place).torque).cast(), place) }, code);
+        assert_eq!((&sample.torque[..2], sample.energy), (&tau[..], expected.energy));
     }
     assert!(library.sample(&PRESSED).torque.norm() > 0.0);
 
@@ -84,6 +89,14 @@ fn look_ups_are_those_of_the_library_and_allocate_nothing() {
     assert_eq!((code, statuses), (hz_code::HZ_OK, [1, 0, 4, 4]));
     let one_by_one: Vec<f64> = places.iter().flat_map(|q| library.sample(q).torque.to_vec()).collect();
     assert_eq!(many, *one_by_one);
+    // In the place of the configurations, or of some of them.
+    for shift in [0, 1, 2, 7] {
+        let mut both = [0.0; 16];
+        both[..8].copy_from_slice(q);
+        let place = both.as_mut_ptr();
+        let code = unsafe { hz_field_torques(opened, 4, place, place.add(shift), null_mut()) };
+        assert_eq!((code, &both[shift..shift + 8]), (hz_code::HZ_OK, &many[..]), "{shift}");
+    }
     unsafe { hz_field_close(opened) };
 }
 
@@ -236,6 +249,32 @@ fn gains_are_taken_and_their_passivity_bounds_told() {
     assert!(code == hz_code::HZ_ARGUMENT && message.contains("size"), "{message}");
 }
 
+/// Whatever later versions add: these are the sizes of the first header with this number.
+#[cfg(target_pointer_width = "64")]
+#[test]
+fn structures_of_the_first_header_are_taken() {
+    let files = Files::new();
+    let (opened, path) = (field(&files), c_path(&files.path("small.toml")));
+    let mut sample = hz_sample { size: 80, ..hz_sample::default() };
+    let gains = hz_gains { size: 152, ..hz_gains::default() };
+    let mut tick = hz_tick { size: 120, ..hz_tick::default() };
+    let mut found = hz_equilibrium { size: 96, ..hz_equilibrium::default() };
+    let (code, felt, _) = haptic_loop(&files, &raw const gains);
+    assert_eq!(code, hz_code::HZ_OK);
+    let (_, solver, _) = open(|out, text| unsafe { hz_solver_open(path.as_ptr(), out, text, ROOM) });
+    let (q, mut tau) = (PRESSED.as_ptr(), [0.0; 2]);
+    unsafe {
+        assert_eq!(hz_field_sample(opened, q, &raw mut sample), hz_code::HZ_OK);
+        assert_eq!(hz_loop_start(felt, q), hz_code::HZ_OK);
+        assert_eq!(hz_loop_tick(felt, q, 0.0, 1e-3, tau.as_mut_ptr(), &raw mut tick), hz_code::HZ_OK);
+        assert_eq!(hz_solver_solve(solver, q, &raw mut found, null_mut(), 0), hz_code::HZ_OK);
+        hz_field_close(opened);
+        hz_loop_close(felt);
+        hz_solver_close(solver);
+    }
+    assert_eq!([sample.size, tick.size, found.size], [80, 120, 96]);
+}
+
 #[test]
 fn a_scene_is_solved_as_the_library_solves_it() {
     let files = Files::new();
@@ -254,6 +293,12 @@ fn a_scene_is_solved_as_the_library_solves_it() {
         for force in forces {
             assert_eq!(force.force, expected.object_nodes[force.node].force.to_array());
         }
+        // The configuration may lie within the equilibrium.
+        let before = found.torque;
+        found.torque[..2].copy_from_slice(&PRESSED);
+        let place = &raw mut found;
+        assert_eq!(hz_solver_solve(solver, (&raw const (*place).torque).cast(), place, null_mut(), 0), hz_code::HZ_OK);
+        assert_eq!(found.torque, before);
         let refused = hz_code::HZ_ARGUMENT;
         assert_eq!(hz_solver_solve(solver, [0.0, f64::NAN].as_ptr(), &raw mut found, null_mut(), 0), refused);
         assert_eq!((found.forces, found.torque), (0, [0.0; HZ_MAX_JOINTS]));
