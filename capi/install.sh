@@ -11,6 +11,17 @@ built=${HAPTIZE_BUILT:-$here/../target/dist}
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$here/Cargo.toml" | head -n 1)
 abi=$(sed -n 's/^#define HZ_ABI \([0-9]*\).*/\1/p' "$here/include/haptize.h")
 
+case $prefix in
+    /*) ;;
+    *) prefix=$PWD/$prefix ;;
+esac
+case $prefix in
+    *[\"\$\\\#]* | *"
+"*)
+        echo "install.sh: pkg-config files cannot name a prefix with \", \$, \\, # or a line break: $prefix" >&2
+        exit 1
+        ;;
+esac
 mkdir -p "$prefix/include" "$prefix/lib/pkgconfig" "$prefix/share/haptize/cmake"
 prefix=$(cd "$prefix" && pwd)
 cp "$here/include/haptize.h" "$prefix/include/"
@@ -23,4 +34,6 @@ else
     cp "$built/libhaptize_capi.so" "$prefix/lib/libhaptize.so.$abi"
     ln -sf "libhaptize.so.$abi" "$prefix/lib/libhaptize.so"
 fi
-sed -e "s|@PREFIX@|$prefix|" -e "s|@VERSION@|$version|" "$here/haptize.pc.in" > "$prefix/lib/pkgconfig/haptize.pc"
+# What sed would take for something else stands for itself.
+escaped=$(printf '%s\n' "$prefix" | sed 's/[&|]/\\&/g')
+sed -e "s|@PREFIX@|$escaped|" -e "s|@VERSION@|$version|" "$here/haptize.pc.in" > "$prefix/lib/pkgconfig/haptize.pc"

@@ -30,14 +30,18 @@ fn is_there(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
-/// Installs the libraries that this test was built with; returns the prefix.
-fn install(files: &Files) -> PathBuf {
+/// The script with the libraries that this test was built with.
+fn install_script(prefix: &Path) -> Command {
     let built = std::env::current_exe().unwrap();
+    let mut command = Command::new("sh");
+    command.arg(Path::new(HERE).join("install.sh")).arg(prefix).env("HAPTIZE_BUILT", built.parent().unwrap());
+    command
+}
+
+/// Installs the libraries; returns the prefix.
+fn install(files: &Files) -> PathBuf {
     let prefix = files.path("prefix");
-    run(Command::new("sh")
-        .arg(Path::new(HERE).join("install.sh"))
-        .arg(&prefix)
-        .env("HAPTIZE_BUILT", built.parent().unwrap()));
+    run(&mut install_script(&prefix));
     prefix
 }
 
@@ -137,4 +141,28 @@ fn cmake_finds_what_is_installed() {
     run(Command::new("cmake").arg("-S").arg(&recipe).arg("-B").arg(&build));
     run(Command::new("cmake").arg("--build").arg(&build));
     assert_eq!(run(Command::new(build.join("program")).arg(&dataset).args(&q)), pressed);
+}
+
+#[test]
+fn it_is_installed_in_folders_of_any_name_or_refused() {
+    let files = Files::new();
+    for name in ["a&b", "a|b", "a b", "-a", "&|; 'x'*"] {
+        let prefix = files.path(name);
+        // Relative, as a user types it.
+        run(install_script(Path::new(name)).current_dir(files.path("")));
+        let written = std::fs::read_to_string(prefix.join("lib/pkgconfig/haptize.pc")).unwrap();
+        let named = written.lines().next().unwrap().strip_prefix("prefix=").unwrap();
+        assert_eq!(Path::new(named).canonicalize().unwrap(), prefix.canonicalize().unwrap(), "{name}");
+        if is_there("pkg-config") && is_there("cc") {
+            // A shell sees one word for each folder.
+            let build = "eval cc -fsyntax-only -x c /dev/null -include haptize.h $(pkg-config --cflags haptize)";
+            run(Command::new("sh").args(["-c", build]).env("PKG_CONFIG_PATH", prefix.join("lib/pkgconfig")));
+        }
+    }
+    for name in ["a\"b", "a$b", "a\\b", "a#b", "a\nb"] {
+        let output = install_script(Path::new(name)).current_dir(files.path("")).output().unwrap();
+        assert!(!output.status.success() && output.stdout.is_empty(), "{name}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("pkg-config files cannot name"), "{name}");
+        assert!(!files.path(name).exists());
+    }
 }
