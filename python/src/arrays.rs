@@ -1,6 +1,7 @@
 //! Arrays in and out: configurations from whatever NumPy takes for numbers, results into the caller's array or a new
 //! one.
 
+use crate::threads;
 use haptize::JointVector;
 use numpy::{
     Element, PyArray, PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
@@ -78,7 +79,7 @@ impl<'py> Configurations<'py> {
         if self.rows() < MANY {
             fill(numbers, results)?;
         } else {
-            py.detach(|| fill(numbers, results))?;
+            threads::detach(py, || fill(numbers, results))??;
         }
         drop(writer);
         Ok(out)

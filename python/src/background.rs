@@ -1,5 +1,6 @@
 //! Work on a thread of its own, so that Ctrl-C ends a call at once, however long what is under way takes.
 
+use crate::threads;
 use pyo3::{panic::PanicException, prelude::*};
 use std::{
     sync::{
@@ -35,7 +36,7 @@ pub fn run<N: Send + 'static, T: Send + 'static>(
     loop {
         let heard = &mut news;
         let happened = match py.detach(move || heard.recv_timeout(TURN)) {
-            Ok(News::Done(result)) => return Ok(result),
+            Ok(News::Done(result)) => return result,
             Ok(News::Told(told)) => hear(told),
             Err(RecvTimeoutError::Timeout) => Ok(()),
             Err(RecvTimeoutError::Disconnected) => Err(PanicException::new_err("the work ended by a panic")),
@@ -51,8 +52,8 @@ pub fn run<N: Send + 'static, T: Send + 'static>(
     }
 }
 
-fn tell<N, T>(work: impl FnOnce(&dyn Fn(N)) -> T, sender: &Sender<News<N, T>>) {
+fn tell<N: Send, T: Send>(work: impl FnOnce(&dyn Fn(N)) -> T + Send, sender: &Sender<News<N, PyResult<T>>>) {
     // Nobody listens where the call has ended.
-    let result = work(&|told| drop(sender.send(News::Told(told))));
+    let result = threads::run(|| work(&|told| drop(sender.send(News::Told(told)))));
     let _ = sender.send(News::Done(result));
 }

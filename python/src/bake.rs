@@ -1,6 +1,6 @@
 //! Bakes: the interpreter is free meanwhile, and Ctrl-C stops them.
 
-use crate::{background, dataset::Dataset, errors, scene::Scene};
+use crate::{background, dataset::Dataset, errors, scene::Scene, threads};
 use haptize::{
     dataset,
     sweep::{BackendChoice, Bake, Progress},
@@ -63,7 +63,8 @@ pub fn bake(
     let report = serde_json::to_value(&report).map_err(|error| PyValueError::new_err(error.to_string()))?;
     let dataset = match (dataset, output) {
         (None, Some(output)) => {
-            py.detach(|| dataset::Dataset::open(&output)).map_err(|error| errors::dataset(py, &error))?
+            let opened = threads::detach(py, || dataset::Dataset::open(&output))?;
+            opened.map_err(|error| errors::dataset(py, &error))?
         }
         (dataset, _) => dataset.ok_or_else(|| errors::BakeError::new_err("the bake gave no dataset"))?,
     };

@@ -1,6 +1,6 @@
 //! Datasets: their columns as read-only views, without a copy.
 
-use crate::{arrays, errors};
+use crate::{arrays, errors, threads};
 use haptize::{
     dataset::{self, Format},
     report,
@@ -53,20 +53,20 @@ impl Dataset {
     /// `load` copies it.
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let opened = py.detach(|| dataset::Dataset::open(&path));
+        let opened = threads::detach(py, || dataset::Dataset::open(&path))?;
         Ok(Self::new(opened.map_err(|error| errors::dataset(py, &error))?, None))
     }
 
     /// Copy the file at `path` into memory, and check all of it.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let opened = py.detach(|| dataset::Dataset::load(&path));
+        let opened = threads::detach(py, || dataset::Dataset::load(&path))?;
         Ok(Self::new(opened.map_err(|error| errors::dataset(py, &error))?, None))
     }
 
     /// Write the dataset to `path`, replacing it whole or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| self.dataset.save(&path)).map_err(|error| errors::dataset(py, &error))
+        threads::detach(py, || self.dataset.save(&path))?.map_err(|error| errors::dataset(py, &error))
     }
 
     /// Write the dataset for other programs, format "npz", "hdf5" or "csv". Returns the files written.
@@ -74,12 +74,12 @@ impl Dataset {
         let Some(format) = Format::named(format) else {
             return Err(PyValueError::new_err(format!("no format {format:?}: take \"npz\", \"hdf5\" or \"csv\"")));
         };
-        py.detach(|| self.dataset.export(&path, format)).map_err(|error| errors::dataset(py, &error))
+        threads::detach(py, || self.dataset.export(&path, format))?.map_err(|error| errors::dataset(py, &error))
     }
 
     /// Draw the configurations in contact and the torque as PNG and SVG files into `folder`. Returns the files written.
     fn figures(&self, py: Python<'_>, folder: PathBuf) -> PyResult<Vec<PathBuf>> {
-        let written = py.detach(|| report::write_figures(&folder, &self.dataset, None));
+        let written = threads::detach(py, || report::write_figures(&folder, &self.dataset, None))?;
         written.map_err(|error| errors::Error::new_err(error.to_string()))
     }
 

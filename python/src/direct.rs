@@ -4,6 +4,7 @@ use crate::{
     arrays::{self, Configurations},
     background, errors,
     scene::Scene,
+    threads,
 };
 use haptize::sweep::{Contact, Direct, Inspection};
 use numpy::PyArrayDyn;
@@ -32,7 +33,7 @@ impl Solver {
     /// Solve the configuration q (rad; m), one entry per joint, from the object at rest.
     fn solve(&self, py: Python<'_>, q: &Bound<'_, PyAny>) -> PyResult<Equilibrium> {
         let q = arrays::vector("q", q, self.direct.joints())?;
-        let inspection = py.detach(|| self.direct.inspect(&q)).map_err(errors::direct)?;
+        let inspection = threads::detach(py, || self.direct.inspect(&q))?.map_err(errors::direct)?;
         Ok(Equilibrium { inspection })
     }
 
@@ -40,7 +41,8 @@ impl Solver {
     fn torque<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let joints = self.direct.joints();
         Configurations::new(q, joints)?.fill(&[joints], None, |q, out: &mut [f64]| {
-            out.copy_from_slice(&self.direct.torques(q).map_err(errors::direct)?.0);
+            let torques = threads::run(|| self.direct.torques(q))?;
+            out.copy_from_slice(&torques.map_err(errors::direct)?.0);
             Ok(())
         })
     }

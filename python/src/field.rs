@@ -3,7 +3,7 @@
 use crate::{
     arrays::{Configurations, Output, plain_vector},
     dataset::Dataset,
-    errors,
+    errors, threads,
 };
 use haptize::{
     JointVector, dataset,
@@ -33,7 +33,7 @@ impl Field {
     fn of(py: Python<'_>, dataset: Py<Dataset>, interpolation: Option<&str>) -> PyResult<Self> {
         let interpolation = interpolation.map(named).transpose()?;
         let data = &dataset.get().dataset;
-        let field = py.detach(|| setup::field(data, interpolation));
+        let field = threads::detach(py, || setup::field(data, interpolation))?;
         Ok(Self { field: field.map_err(|error| errors::setup(py, &error))?, dataset })
     }
 }
@@ -59,7 +59,8 @@ impl Field {
     #[staticmethod]
     #[pyo3(signature = (path, interpolation = None))]
     fn open(py: Python<'_>, path: PathBuf, interpolation: Option<&str>) -> PyResult<Self> {
-        let opened = py.detach(|| dataset::Dataset::open(&path)).map_err(|error| errors::dataset(py, &error))?;
+        let opened = threads::detach(py, || dataset::Dataset::open(&path))?;
+        let opened = opened.map_err(|error| errors::dataset(py, &error))?;
         Self::of(py, Py::new(py, Dataset::new(opened, None))?, interpolation)
     }
 

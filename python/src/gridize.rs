@@ -1,6 +1,6 @@
 //! Scattered measurements put on a grid.
 
-use crate::{arrays, dataset::Dataset, errors};
+use crate::{arrays, dataset::Dataset, errors, threads};
 use haptize::{
     dataset::JointLabel,
     gridize::{self as library, GridizeOptions, Interpolation, Samples},
@@ -62,7 +62,7 @@ pub fn gridize(
     let joints = names.into_iter().zip(units).map(|(name, unit)| JointLabel { name, unit }).collect();
     let samples = Samples { joints, configurations, torques, deviations };
     let options = GridizeOptions { steps: arrays::numbers(step)?.0, epsilon, interpolation, smooth };
-    let gridized = py.detach(|| library::gridize(&samples, &options));
+    let gridized = threads::detach(py, || library::gridize(&samples, &options))?;
     let (mut dataset, report) = gridized.map_err(|error| errors::gridize(&error))?;
     dataset.provenance.backend = "import".into();
     dataset.provenance.adapter = "Python".into();

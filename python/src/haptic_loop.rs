@@ -1,6 +1,6 @@
 //! The passive haptic loop, driven tick by tick by the caller's own device.
 
-use crate::{arrays, dataset::Dataset, errors};
+use crate::{arrays, dataset::Dataset, errors, threads};
 use haptize::{
     JointVector,
     render::{
@@ -39,7 +39,7 @@ impl Loop {
     #[pyo3(signature = (dataset, gains = None))]
     fn new(py: Python<'_>, dataset: &Bound<'_, Dataset>, gains: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let dataset = &dataset.get().dataset;
-        let setup = py.detach(|| Setup::new(dataset)).map_err(|error| errors::setup(py, &error))?;
+        let setup = threads::detach(py, || Setup::new(dataset))?.map_err(|error| errors::setup(py, &error))?;
         let (haptics, advice) = match gains {
             None => (setup.haptics, setup.advice),
             Some(gains) => {
@@ -49,7 +49,8 @@ impl Loop {
                     let key: String = key.extract()?;
                     spec.set_gain(&key, &values).map_err(|error| PyValueError::new_err(error.to_string()))?;
                 }
-                let retuned = py.detach(|| setup.retuned(dataset, &spec)).map_err(|error| errors::setup(py, &error))?;
+                let retuned = threads::detach(py, || setup.retuned(dataset, &spec))?;
+                let retuned = retuned.map_err(|error| errors::setup(py, &error))?;
                 (Arc::new(retuned.0), retuned.1)
             }
         };

@@ -11,13 +11,14 @@ mod field;
 mod gridize;
 mod haptic_loop;
 mod scene;
+mod threads;
 
 use pyo3::prelude::*;
 
 /// Contact solved beforehand for every joint configuration, felt at 1 kHz.
 #[pymodule]
 mod _haptize {
-    use super::errors;
+    use super::{errors, threads};
     use pyo3::prelude::*;
     use std::ffi::OsString;
 
@@ -42,6 +43,7 @@ mod _haptize {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        threads::watch_forks(module)?;
         errors::add(module)
     }
 }
