@@ -6,7 +6,7 @@ use super::{
     tell,
 };
 use crate::{
-    dataset::Grid,
+    dataset::{Claim, Grid},
     device::Device,
     render::{
         graphics::Graphics,
@@ -55,11 +55,20 @@ pub struct Choices {
 }
 
 impl Choices {
-    /// The scene at `path`, with what an earlier session left in `file`.
+    /// The scene at `path`, with what an earlier session left in `file`, which no other session may have.
     pub fn open(self, path: &Path, file: &Path) -> Result<Exploring, Failure> {
         let began = Instant::now();
+        let failed = |why: String| format!("{}: {why}", file.display());
+        let claim =
+            Claim::new(file).map_err(|error| failed(format!("cannot be written: {error}; name another file")))?;
+        let claim = claim.ok_or_else(|| {
+            failed(
+                "another session on demand keeps this file and would be overwritten: end it, or name another file"
+                    .into(),
+            )
+        })?;
         let on_demand = OnDemand::open(path, file, self.levels, self.threads.map(usize::from))?;
-        Ok(Exploring { on_demand: Arc::new(on_demand), file: file.into(), began })
+        Ok(Exploring { on_demand: Arc::new(on_demand), file: file.into(), began, _claim: claim })
     }
 }
 
@@ -69,6 +78,7 @@ pub struct Exploring {
     /// The file that keeps the explored part.
     file: PathBuf,
     began: Instant,
+    _claim: Claim,
 }
 
 /// Work done, and answers.

@@ -6,6 +6,7 @@
 //! in that folder removes. A temporary file is locked as long as it is written, and the system unlocks it however a
 //! process ends.
 
+use super::claim;
 use std::{
     collections::BTreeSet,
     fs::{self, File},
@@ -74,6 +75,7 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 pub fn discard_unfinished() {
     static DONE: Once = Once::new();
     DONE.call_once(|| {
+        claim::discard();
         let unfinished = unfinished();
         for path in unfinished.iter() {
             // A file that has just taken its final name is no longer there.
@@ -181,7 +183,7 @@ fn take_over(path: &Path, file: &File) -> io::Result<()> {
 }
 
 /// The folder of the file at `path`.
-fn folder(path: &Path) -> &Path {
+pub(super) fn folder(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -189,8 +191,8 @@ fn folder(path: &Path) -> &Path {
 }
 
 /// How names of temporary files begin and end.
-const PREFIX: &str = ".haptize-";
-const SUFFIX: &str = ".tmp";
+pub(super) const PREFIX: &str = ".haptize-";
+pub(super) const SUFFIX: &str = ".tmp";
 
 /// Makes a temporary file in `folder`, locked so that no other process takes it for abandoned.
 fn locked_in(folder: &Path) -> io::Result<NamedTempFile> {

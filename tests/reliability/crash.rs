@@ -201,12 +201,20 @@ fn a_killed_session_on_demand_leaves_a_whole_dataset_that_the_next_goes_on_with(
         );
         std::thread::sleep(Duration::from_millis(20));
     }
+    // Nobody else explores into the file meanwhile.
+    let second = command(folder.path(), &play("0.2")).output().unwrap();
+    assert_eq!(second.status.code(), Some(1), "{}", message(&second));
+    assert!(message(&second).contains("another session on demand keeps this file"), "{}", message(&second));
     session.kill().unwrap();
     session.wait().unwrap();
     let kept = haptize::dataset::Dataset::load(&file).unwrap().refinement.unwrap().horizon();
     assert!(kept > 100, "{kept} blocks");
     let felt: serde_json::Value = serde_json::from_str(&succeed(folder.path(), &play("0.2"))).unwrap();
     assert_eq!(felt["explored"]["known_blocks"].as_u64(), Some(kept));
+    let names =
+        std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let left: Vec<String> = names.filter(|name| name.ends_with(".tmp")).collect();
+    assert!(left.is_empty(), "{left:?}");
 }
 
 #[test]
