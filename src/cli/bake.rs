@@ -5,7 +5,7 @@ use super::{
     output::{self, Kind},
     reach, refine,
     shard::ShardChoice,
-    watch::{describe, touches, warn, watched},
+    watch::{configurations, describe, touches, warn, watched},
 };
 use crate::{
     scene::{Algorithm, Scene},
@@ -46,7 +46,7 @@ pub struct Arguments {
     resume: bool,
     /// Number of random configurations at which the dataset's error is measured afterwards; 0 skips this. By default a
     /// tenth of the points in contact, at least 100 and at most 1000.
-    #[arg(long, value_name = "COUNT", conflicts_with = "max_error")]
+    #[arg(long, value_name = "COUNT", value_parser = configurations(), conflicts_with = "max_error")]
     measure_error: Option<usize>,
     /// Choose grid spacing, interpolation and solver tolerance for this rms error of the torque, and verify it: a
     /// fraction of the torque's own rms over the grid (0.01 or 1%), or a torque ("0.002 N m").

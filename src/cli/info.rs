@@ -152,6 +152,6 @@ pub fn error(text: &mut String, measured: Option<&MeasuredError>, aim: Option<f6
     }
     writeln!(text)?;
     let Some(aim) = aim else { return Ok(()) };
-    let verdict = if measured.relative() <= aim { "kept" } else { "missed" };
+    let verdict = if measured.keeps(aim) { "kept" } else { "missed" };
     writeln!(text, "  {:<12} asked for: {:.2} % rms, {verdict}", "", 100.0 * aim)
 }

@@ -37,7 +37,7 @@ pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> 
         Ok::<_, PilotError>((pilot, choice, report))
     })?;
     watch::warn(&report);
-    let is_kept = report.error.as_ref().is_some_and(|error| error.relative() <= pilot.relative);
+    let is_kept = report.error.as_ref().is_some_and(|error| error.keeps(pilot.relative));
     let mut json = serde_json::to_value(&report)?;
     json["file"] = wanted.output.display().to_string().into();
     json["pilot"] = serde_json::to_value(&pilot)?;

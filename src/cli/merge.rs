@@ -29,7 +29,7 @@ pub struct Arguments {
     output: PathBuf,
     /// Number of random configurations at which the dataset's error is measured; 0 skips this. By default a tenth of
     /// the points in contact, at least 100 and at most 1000.
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = watch::configurations())]
     measure_error: Option<usize>,
     /// Take it for success that the arm touches the object at no grid point.
     #[arg(long)]

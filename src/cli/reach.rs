@@ -152,7 +152,7 @@ fn find(scene: &Scene, arguments: &Arguments, stop: &AtomicBool) -> Result<Found
 /// The table of a grid that keeps the pilot's aim, of at most `limit` points.
 fn grid(reach: &Reach, pilot: &Pilot, based: &Scene, limit: usize) -> Result<String, String> {
     let cost = pilot.cost(based, pilot.relative).filter(|cost| cost.is_known && cost.points <= limit as f64);
-    let cost = cost.ok_or_else(|| pilot.refusal(limit))?;
+    let cost = cost.ok_or_else(|| pilot.refusal(based, limit))?;
     Ok(reach.table(&pilot.spaced(based, cost.finer)))
 }
 

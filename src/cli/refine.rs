@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     contact::{Backend, Model},
-    dataset::{Dataset, MeasuredError, Provenance, Surface},
+    dataset::{MeasuredError, Provenance, Surface},
     proxy::Chain,
     scene::Scene,
     store::{Order, Store},
@@ -16,7 +16,7 @@ use crate::{
         sample,
     },
 };
-use std::{fmt::Write, path::Path, sync::Arc, time::Instant};
+use std::{fmt::Write, path::Path, time::Instant};
 
 /// Configurations in contact by which the refinement is stopped, and as many others at which its error is measured (1):
 /// with fewer the rms varies by more than a tenth.
@@ -62,7 +62,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
     let measured = judges[1].measure(&refined.store);
     let error = measured.relative();
-    let (kept, file) = (error <= aim, wanted.output.display());
+    let (kept, file) = (measured.keeps(aim), wanted.output.display());
     let memory = refined.store.bytes();
     let mut json = serde_json::json!({
         "file": file.to_string(), "nodes": refined.nodes, "by_level": refined.by_level,
@@ -76,9 +76,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let (backend, adapter, notices) = (backend.name().to_owned(), backend.adapter(), refined.notices);
     let (error, aim) = (Some(measured), Some(aim));
     let provenance = Provenance { notices, backend, adapter, error, aim, ..CpuBackend::provenance(scene) };
-    let surface = Some(Surface::of(&object));
-    let dataset = Dataset::refined(Arc::new(refined.store), refine.base, surface, scene.text.clone(), provenance);
-    dataset.save(wanted.output)?;
+    refined.store.save(&refine.base, Some(&Surface::of(&object)), &scene.text, &provenance, wanted.output)?;
     let (seconds, bytes) = (began.elapsed().as_secs_f64(), std::fs::metadata(wanted.output)?.len() as usize);
     json["bytes"] = bytes.into();
     json["seconds"] = seconds.into();

@@ -4,13 +4,22 @@ use super::{Failure, bar::Bar, info, interrupt, tell};
 use crate::{
     dataset::Dataset,
     scene::Scene,
-    sweep::{BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, Iterations, Lowered, Progress, SweepReport},
+    sweep::{
+        BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, Iterations, Lowered, MOST_CONFIGURATIONS,
+        Progress, SweepReport,
+    },
 };
+use clap::builder::RangedU64ValueParser;
 use std::{
     fmt::{self, Write},
     path::Path,
     time::SystemTime,
 };
+
+/// Reads a number of random configurations at which an error is measured: too large a one is told before hours of work.
+pub fn configurations() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(..=MOST_CONFIGURATIONS as u64)
+}
 
 /// Runs `bake`, dated now, with a progress bar. Ctrl-C stops it.
 pub fn watched<T, E: Into<Failure>>(

@@ -16,7 +16,7 @@ pub struct MeasuredError {
     /// Arm with which the forces of sliding joints count (m); absent where no joint slides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lever_arm: Option<f64>,
-    /// Interpolation that the scene names.
+    /// Interpolation by which the dataset answers as its scene has it felt, one of those in `errors`.
     pub interpolation: String,
     /// Errors of each interpolation.
     pub errors: Vec<InterpolationError>,
@@ -51,11 +51,18 @@ impl InterpolationError {
 }
 
 impl MeasuredError {
-    /// Rms error of the scene's own interpolation over the rms of the torque (1); zero where nothing touches.
+    /// Rms error of the scene's own interpolation over the rms of the torque (1), zero where nothing touches; `None`
+    /// where that interpolation was not measured.
     #[must_use]
-    pub fn relative(&self) -> f64 {
+    pub fn relative(&self) -> Option<f64> {
         let own = self.errors.iter().find(|error| error.interpolation == self.interpolation);
-        own.map_or(0.0, |error| error.rms / self.torque.max(f64::MIN_POSITIVE))
+        own.map(|error| error.rms / self.torque.max(f64::MIN_POSITIVE))
+    }
+
+    /// Whether [`MeasuredError::relative`] is at most `aim` (1).
+    #[must_use]
+    pub fn keeps(&self, aim: f64) -> bool {
+        self.relative().is_some_and(|error| error <= aim)
     }
 
     /// Errors of each interpolation in percent of the rms torque, a line each, the scene's own interpolation first.
@@ -98,12 +105,16 @@ mod tests {
             errors: vec![error, other],
             left_out: 0,
         };
-        assert!((measured.relative() - 0.01).abs() < 1e-15);
+        assert!((measured.relative().unwrap() - 0.01).abs() < 1e-15);
+        assert!(measured.keeps(0.011) && !measured.keeps(0.009));
         let lines = measured.lines();
         assert_eq!(
             lines,
             ["`potential` 1.0 % rms, median 1.0 %, worst 1.0 %", "`linear` 28.9 % rms, median 30.0 %, worst 40.0 %"]
         );
         assert_eq!(MeasuredError::default().lines(), ["nothing touches"]);
+        // What was not measured is not taken for perfect.
+        let unknown = MeasuredError { interpolation: "direct".into(), ..measured };
+        assert!(unknown.relative().is_none() && !unknown.keeps(1.0));
     }
 }

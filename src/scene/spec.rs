@@ -336,6 +336,18 @@ pub enum Algorithm {
     Linearised,
 }
 
+impl Algorithm {
+    /// As the scene names it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Energy => "energy",
+            Self::Paper => "paper",
+            Self::Linearised => "linearised",
+        }
+    }
+}
+
 /// The uniform grid over C-space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridSpec {
@@ -491,6 +503,12 @@ pub enum Interpolation {
 impl Interpolation {
     /// All between the points of a grid, from the roughest on.
     pub const ALL: [Self; 2] = [Self::Linear, Self::Potential];
+
+    /// The one of [`Interpolation::ALL`] by which a dataset answers where the scene names this one.
+    #[must_use]
+    pub fn in_a_dataset(self) -> Self {
+        if self == Self::Direct { Self::Potential } else { self }
+    }
 
     /// As the scene names it.
     #[must_use]

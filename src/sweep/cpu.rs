@@ -61,7 +61,7 @@ impl<'a> CpuBackend<'a> {
     pub fn provenance(scene: &Scene) -> Provenance {
         Provenance {
             version: env!("CARGO_PKG_VERSION").into(),
-            algorithm: "energy".into(),
+            algorithm: scene.contact.algorithm.name().into(),
             tolerance: scene.contact.tolerance,
             backend: "cpu".into(),
             adapter: Self::adapter(),
@@ -218,6 +218,17 @@ mod tests {
         backend.stream(&mut work).unwrap();
         assert_eq!(work.torques, at_once.into_iter().map(|equilibrium| equilibrium.torque).collect::<Vec<_>>());
         assert_eq!(work.others, [2, 2, 2, 1, 0], "while one is taken two others are solved");
+    }
+
+    #[test]
+    fn provenance_names_the_algorithm_of_the_scene() {
+        use clap::ValueEnum;
+        let mut scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
+        for algorithm in crate::scene::Algorithm::value_variants() {
+            scene.contact.algorithm = *algorithm;
+            let named = algorithm.to_possible_value().unwrap();
+            assert_eq!(CpuBackend::provenance(&scene).algorithm, named.get_name());
+        }
     }
 
     #[test]

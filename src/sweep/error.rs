@@ -1,5 +1,6 @@
 //! Why a sweep ended early, what was kept of it, and what to do.
 
+use super::measured::MOST_CONFIGURATIONS;
 use crate::{dataset, memory::Shortage};
 use std::{
     collections::TryReserveError,
@@ -17,6 +18,12 @@ pub enum SweepError {
     /// Invalid grid.
     #[error("the scene's grid: {0}; correct `axes` of [grid] in the scene")]
     Grid(String),
+    /// The error cannot be measured at so many configurations.
+    #[error("the error cannot be measured at {asked} configurations: {MOST_CONFIGURATIONS} are the most")]
+    Configurations {
+        /// Configurations asked for.
+        asked: usize,
+    },
     /// The columns do not fit in memory.
     #[error("the grid's {points} points need {} MB of memory ({source}); take a coarser grid, or haptize into a file \
              (`haptize bake`), which takes little memory whatever the grid", bytes / 1_000_000)]

@@ -10,7 +10,7 @@ use super::{
     columns::{Columns, Rows, Shape},
     footprint::{self, Bounds},
     lowest,
-    measured::ErrorCheck,
+    measured::{ErrorCheck, MOST_CONFIGURATIONS},
     part::{Binding, Part},
     shard::Shard,
     table::{Block, Table},
@@ -23,7 +23,6 @@ use crate::{
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
 };
-use clap::ValueEnum;
 use std::{
     ffi::OsString,
     path::{Path, PathBuf},
@@ -137,11 +136,7 @@ impl<'a> Sweep<'a> {
             scene_path: std::path::absolute(&scene.path).unwrap_or_default().to_string_lossy().into_owned(),
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").into(),
-                algorithm: scene
-                    .contact
-                    .algorithm
-                    .to_possible_value()
-                    .map_or_else(String::new, |v| v.get_name().into()),
+                algorithm: scene.contact.algorithm.name().into(),
                 tolerance: scene.contact.tolerance,
                 backend: backend.into(),
                 adapter: adapter.into(),
@@ -198,7 +193,8 @@ impl<'a> Sweep<'a> {
     /// those of the scene.
     ///
     /// # Errors
-    /// [`SweepError::Grid`] when the model's proxy has other joints.
+    /// [`SweepError::Grid`] when the model's proxy has other joints, [`SweepError::Configurations`] when there are too
+    /// many.
     pub fn measure_error(
         &mut self,
         model: &'a Model<'a>,
@@ -207,7 +203,10 @@ impl<'a> Sweep<'a> {
     ) -> Result<(), SweepError> {
         let (threshold, slope) = (haptics.threshold, haptics.boundary_slope);
         let (model, lowest) = (self.fitting(model)?, self.lowest.is_some());
-        let interpolation = haptics.interpolation;
+        if let Some(asked) = configurations.filter(|asked| *asked > MOST_CONFIGURATIONS) {
+            return Err(SweepError::Configurations { asked });
+        }
+        let interpolation = haptics.interpolation.in_a_dataset();
         self.error = Some(ErrorCheck { model, threshold, slope, interpolation, configurations, lowest });
         Ok(())
     }

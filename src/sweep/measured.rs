@@ -33,6 +33,13 @@ const CONFIGURATIONS: Range<usize> = 100..1000;
 /// Seed of the random configurations; differs from the pilot's.
 const SEED: u64 = 0x94d0_49bb_1331_11eb;
 
+/// Most random configurations that may be asked for (1): their rms is good to a thousandth. More would take memory, and days.
+pub const MOST_CONFIGURATIONS: usize = 1_000_000;
+
+/// Configurations that are drawn at a time (1): more takes memory, less goes through the grid oftener. Room for
+/// [`CONFIGURATIONS`] with six joints.
+const DRAWS: usize = 1 << 17;
+
 /// Most grid points of which an interpolation is formed as a whole (1): some 50 MB.
 const WHOLE: usize = 1 << 18;
 
@@ -48,7 +55,7 @@ pub(super) struct ErrorCheck<'a> {
     pub model: &'a Model<'a>,
     pub threshold: f64,
     pub slope: JointVector,
-    /// Interpolation that the scene names.
+    /// Interpolation by which the dataset answers.
     pub interpolation: Interpolation,
     /// Number of configurations; by default [`CONFIGURATIONS`].
     pub configurations: Option<usize>,
@@ -76,7 +83,7 @@ impl ErrorCheck<'_> {
         if count == 0 {
             return Ok(None);
         }
-        let places = places(grid, table, contacts, count);
+        let places = places(grid, table, contacts, count, DRAWS);
         let solvers = Solvers::new(self.model, rayon::current_num_threads());
         let solved = solvers.map(&places, |solver, place| {
             if stop.load(Ordering::Relaxed) {
@@ -154,11 +161,25 @@ fn interpolated(
     places.par_iter().map(around).collect()
 }
 
-/// Random configurations, evenly spread over the cells with a corner in contact, at most `count` of them.
+/// Random configurations, evenly spread over the cells with a corner in contact, at most `count` of them, of which `together` are
+/// drawn at a time.
+fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize, together: usize) -> Vec<Place> {
+    let mut random = Random::new(SEED);
+    let (mut places, mut left) = (Vec::new(), (2 * count) << grid.joints());
+    while left > 0 && places.len() < count {
+        let draws = left.min(together);
+        left -= draws;
+        places.extend(drawn(grid, table, contacts, draws, &mut random));
+    }
+    places.truncate(count);
+    places
+}
+
+/// The configurations of so many `draws`.
 ///
 /// A corner in contact is drawn, then one of the cells around it, which is taken with a probability of one over its
 /// corners in contact: so each such cell is as likely as any other.
-fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<Place> {
+fn drawn(grid: &Grid, table: &Table<'_>, contacts: usize, draws: usize, random: &mut Random) -> Vec<Place> {
     struct Draw {
         rank: usize,
         side: usize,
@@ -166,8 +187,7 @@ fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<
         fractions: JointVector,
     }
     let joints = grid.joints();
-    let mut random = Random::new(SEED);
-    let draws: Vec<Draw> = (0..(2 * count) << joints)
+    let draws: Vec<Draw> = (0..draws)
         .map(|_| {
             let mut whole =
                 |below: usize| ((random.between(0.0, 1.0) * below as f64) as usize).min(below.saturating_sub(1));
@@ -197,7 +217,7 @@ fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize) -> Vec<
         }
         Some(Place { q, cell })
     };
-    draws.iter().zip(points).filter_map(place).take(count).collect()
+    draws.iter().zip(points).filter_map(place).collect()
 }
 
 /// The grid points of `ranks`, which ascend, among those in contact, as far as there are so many; on all cores.
@@ -301,7 +321,7 @@ mod tests {
         let columns = columns(&grid);
         let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
-        let places = places(&grid, &table, 16, 1200);
+        let places = places(&grid, &table, 16, 1200, DRAWS);
         assert_eq!(places.len(), 1200);
         let mut counts = [[0; 3]; 4];
         for Place { q, cell } in &places {
@@ -313,6 +333,12 @@ mod tests {
         }
         // Binomial, of mean 100 and standard deviation 9.6.
         assert!(counts.as_flattened().iter().all(|count| (60..140).contains(count)), "{counts:?}");
+        // The same, however many are drawn at a time.
+        for together in [1, 100, 5000] {
+            let again = super::places(&grid, &table, 16, 1200, together);
+            let alike = |(a, b): (&Place, &Place)| a.q == b.q && a.cell == b.cell;
+            assert!(again.len() == 1200 && again.iter().zip(&places).all(alike), "{together}");
+        }
         assert_eq!(corners(&grid, &[3, 1]).collect::<Vec<_>>(), [13, 14, 17, 18]);
     }
 
@@ -321,7 +347,7 @@ mod tests {
         let grid = synthetic::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
         let columns = columns(&grid);
         let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
-        let places = places(&grid, &table, 54 * 80, 50);
+        let places = places(&grid, &table, 54 * 80, 50, DRAWS);
         let exact: Vec<_> = places.iter().map(|place| (place, JointVector::zeros(2))).collect();
         let slope = JointVector::from_slice(&[1e3, 1e3]);
         for interpolation in Interpolation::ALL {

@@ -51,6 +51,7 @@ pub use free_space::{FreeGaps, FreeSpace};
 pub use grid_sweep::{Progress, Run, Sweep, grid_of};
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use lowest::Lowered;
+pub use measured::MOST_CONFIGURATIONS;
 pub use merge::{Merge, MergeError, Merged};
 pub use node::{NoEnergy, check_algorithm, order_of};
 pub(crate) use pilot::FARTHEST_EXTRAPOLATION;

@@ -273,8 +273,7 @@ impl Pilot {
     #[must_use]
     pub fn cost(&self, scene: &Scene, relative: f64) -> Option<Cost> {
         let all = prospects(&self.trials, SPACING_SHARE * relative * self.torque, scene.grid.axes.len());
-        let own = scene.haptics.interpolation.name();
-        let Prospect { points, finer, .. } = all.into_iter().find(|prospect| prospect.interpolation == own)?;
+        let Prospect { points, finer, .. } = *own(&all, scene)?;
         let (seconds, bytes) = (points * self.seconds_per_point, points * self.bytes_per_point);
         Some(Cost { relative, points, finer, seconds, bytes, is_known: finer <= FARTHEST_EXTRAPOLATION })
     }
@@ -292,13 +291,16 @@ impl Pilot {
     /// # Errors
     /// [`PilotError::OutOfReach`] where there are none; it says what the pilot measured, and what would help.
     pub fn choose(&self, scene: &Scene, limit: usize, backend: BackendChoice) -> Result<Choice, PilotError> {
-        let best = self.prospects.first();
-        let Some(best) = best.filter(|best| best.points <= limit as f64 && best.finer <= FARTHEST_EXTRAPOLATION) else {
-            return Err(PilotError::OutOfReach(self.refusal(limit)));
+        // What is solved beside the loop is no matter of the grid, and stays.
+        let stays = scene.haptics.interpolation == Interpolation::Direct;
+        let best = if stays { own(&self.prospects, scene) } else { self.prospects.first() };
+        let within = |best: &&Prospect| best.points <= limit as f64 && best.finer <= FARTHEST_EXTRAPOLATION;
+        let Some(best) = best.filter(within) else {
+            return Err(PilotError::OutOfReach(self.refused(best, limit)));
         };
         let mut chosen = self.spaced(scene, best.finer);
         chosen.contact.tolerance = self.tolerance;
-        let interpolation = Interpolation::ALL.into_iter().find(|i| i.name() == best.interpolation);
+        let interpolation = Interpolation::ALL.into_iter().find(|i| i.name() == best.interpolation && !stays);
         chosen.haptics.interpolation = interpolation.unwrap_or(scene.haptics.interpolation);
         let chosen = chosen.with_own_text()?;
         let points = spacing::points(&chosen);
@@ -313,9 +315,14 @@ impl Pilot {
         })
     }
 
-    /// Why no grid of at most `limit` points was chosen, and what to do.
+    /// Why no grid of at most `limit` points was chosen for the interpolation of `scene`, and what to do.
     #[must_use]
-    pub fn refusal(&self, limit: usize) -> String {
+    pub fn refusal(&self, scene: &Scene, limit: usize) -> String {
+        self.refused(own(&self.prospects, scene), limit)
+    }
+
+    /// Why no grid of at most `limit` points was chosen, of which `best` needs the fewest, and what to do.
+    fn refused(&self, best: Option<&Prospect>, limit: usize) -> String {
         let arm = arm_note(self.lever_arm);
         let aim = format!("an rms error of {:.2e} N m{arm}, {} % of the rms torque", self.aim, percent(self.relative));
         let Some(finest) = self.trials.first() else { return format!("{aim}, is out of reach: no grid was tried") };
@@ -327,7 +334,7 @@ impl Pilot {
             tried.interpolation,
             percent(tried.rms / self.torque)
         );
-        let falls = match self.prospects.first() {
+        let falls = match best {
             None => "and finer grids do not help".to_owned(),
             Some(best) => format!(
                 "and errors fall only with the spacing to the power {:.2} (`{}`): it would take {:.1e} points, {:.1} \
@@ -342,6 +349,12 @@ impl Pilot {
              was baked"
         )
     }
+}
+
+/// The prospect of the interpolation of `scene`.
+fn own<'a>(prospects: &'a [Prospect], scene: &Scene) -> Option<&'a Prospect> {
+    let own = scene.haptics.interpolation.in_a_dataset().name();
+    prospects.iter().find(|prospect| prospect.interpolation == own)
 }
 
 /// `share` in percent, to two digits.
