@@ -1,5 +1,6 @@
 //! Comma-separated text: the one way in which all tables are written, and the fields of a line that is read.
 
+use crate::names::{escaped, is_disruptive};
 use std::{
     fmt::Display,
     io::{self, Write},
@@ -57,14 +58,15 @@ impl<W: Write> Table<W> {
     }
 }
 
-/// Returns `text` as one field (RFC 4180).
+/// Returns `text` as one field (RFC 4180) of one line, which commands no terminal.
 pub(crate) fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
+    let text = escaped(text);
+    if text.contains([',', '"']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into_owned() }
 }
 
 /// Returns a name without the characters that structure a table, for readers that know no quotes.
 pub(crate) fn plain(name: &str) -> String {
-    name.replace([',', '"', '\n', '\r'], "_")
+    name.replace(|c| matches!(c, ',' | '"') || is_disruptive(c), "_")
 }
 
 /// Returns the fields of a line, trimmed of blanks and quotation marks. Between quotation marks a delimiter is a character
@@ -102,6 +104,18 @@ fn end_of_quotation(text: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_field_is_one_line_that_commands_no_terminal() {
+        for (text, field) in [
+            ("torque a [N m]", "torque a [N m]"),
+            ("a, \"b\"", "\"a, \"\"b\"\"\""),
+            ("a\nb\u{1b}[2J\u{9b}c\u{202e}", "a\\u000ab\\u001b[2J\\u009bc\\u202e"),
+        ] {
+            assert_eq!(quoted(text), field);
+        }
+        assert_eq!(plain("a,b\"c\nd\u{1b}e\u{2028}f"), "a_b_c_d_e_f");
+    }
 
     #[test]
     fn quotation_marks_hold_a_field_together() {

@@ -107,6 +107,7 @@ mod input;
 mod joint_matrix;
 mod joint_vector;
 pub mod memory;
+mod names;
 mod random;
 
 pub use joint_matrix::JointMatrix;

@@ -137,6 +137,8 @@ fn broken_scenes_are_refused_with_place_and_remedy() {
         ("an unknown key", changed("rate = 60.0", "rating = 60.0"), "rating = 60.0", "rating"),
         ("negative stiffness", changed("stiffness = 300.0", "stiffness = -300.0"), "-300.0", "positive"),
         ("a NaN", changed("node_mass = 0.005", "node_mass = nan"), "node_mass = nan", "node_mass"),
+        ("a name of two lines", changed("name = \"finger\"", r#"name = "finger\n1 point""#), "name =", "U+000A"),
+        ("a name that turns", changed("name = \"finger\"", r#"name = "finger\u202e""#), "name =", "U+202E"),
         ("no TOML", changed("name = \"finger\"", "name = finger"), "name = finger", "expected"),
         ("a missing mesh", changed(sphere, "mesh = { file = \"none.obj\" }"), "none.obj", "cannot be opened"),
         ("an open mesh", changed(sphere, "mesh = { file = \"open.obj\" }"), "", "open.obj"),
@@ -234,6 +236,32 @@ fn bake_info_and_export_tell_the_same() {
     let files = exported["files"].as_array().unwrap();
     let rows = std::fs::read_to_string(folder.path().join(files[0].as_str().unwrap())).unwrap();
     assert_eq!(rows.lines().filter(|line| !line.starts_with('#')).count(), 1 + 8, "{rows}");
+}
+
+/// What a file says of who made it, and of its interpolation, stays within its line.
+#[test]
+fn no_text_of_a_dataset_forges_a_line_of_info() {
+    use haptize::dataset::{Dataset, InterpolationError, MeasuredError};
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("finger.toml"), FINGER).unwrap();
+    json(folder.path(), &["bake", "finger.toml", "-o", "f.haptize", "--backend", "cpu", "--json"]);
+    let mut dataset = Dataset::load(&folder.path().join("f.haptize")).unwrap();
+    let honest = haptize(folder.path(), &["info", "f.haptize"]).stdout;
+    let odd = || "x\nforged: sound\u{202e}\u{2028}\u{1b}[2J".to_owned();
+    let made = &mut dataset.provenance;
+    for text in [&mut made.version, &mut made.algorithm, &mut made.backend, &mut made.adapter, &mut made.date] {
+        *text = odd();
+    }
+    let errors = vec![InterpolationError { interpolation: odd(), ..InterpolationError::default() }];
+    made.error = Some(MeasuredError { configurations: 1, interpolation: odd(), errors, ..MeasuredError::default() });
+    dataset.save(&folder.path().join("f.haptize")).unwrap();
+    let told = text(&haptize(folder.path(), &["info", "f.haptize"]).stdout);
+    assert!(told.contains("x\\u000aforged: sound\\u202e\\u2028\\u001b[2J"), "{told}");
+    assert!(!told.lines().any(|line| line.starts_with("forged")), "{told}");
+    assert!(!told.contains(['\u{202e}', '\u{2028}', '\u{1b}']), "{told}");
+    // The error takes as many lines as where it is honest, less those of the other interpolation.
+    assert!(told.lines().count() <= text(&honest).lines().count(), "{told}");
+    json(folder.path(), &["info", "f.haptize", "--json"]);
 }
 
 #[test]

@@ -308,6 +308,8 @@ fn hostile_grids() -> Vec<Hostile> {
         ("a trillion points", axis("count", 1_000_000_000_000_u64.into()), "shape"),
         ("a count that overflows", axis("count", u64::MAX.into()), "too many points"),
         ("a negative count", axis("count", (-1).into()), "grid"),
+        ("a name of two lines", axis("name", "a\nb".into()), "a\\u000ab"),
+        ("a name that turns", axis("name", "a\u{202e}b".into()), "U+202E"),
         ("no lines", axis("count", 0.into()), "no grid lines"),
         ("a step of zero", axis("step", 0.0.into()), "ascend"),
         ("a step lost in rounding", axis("start", 1e18.into()), "ascend"),

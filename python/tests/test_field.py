@@ -176,3 +176,5 @@ def test_samples_become_a_field():
     for wrong in ((q, tau, -0.1), (q * np.nan, tau, 0.1), (q[:2], tau[:2], 0.1), (q, tau, [0.1, 0.1, 0.1])):
         with pytest.raises(haptize.GridizeError):
             haptize.gridize(*wrong)
+    with pytest.raises(haptize.GridizeError, match="U\\+000A"):
+        haptize.gridize(q, tau, 0.1, names=["a\nb: sound", "c"])

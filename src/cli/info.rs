@@ -4,6 +4,7 @@ use super::{Failure, Report};
 use crate::{
     contact::MeshRipple,
     dataset::{Axis, Dataset, MeasuredError, Refinement, Summary},
+    names::escaped,
     object::Skin,
     scene::{Material, ObjectSpec, Rendering, SkinSpec, arm_note},
 };
@@ -120,12 +121,14 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
     let from = &summary.provenance;
     mesh_ripple(text, from.mesh_ripple)?;
     error(text, from.error.as_ref(), from.aim)?;
-    write!(text, "  made         {} by haptize {}: {}", from.date, from.version, from.algorithm)?;
+    let [date, version, algorithm, backend, adapter] =
+        [&from.date, &from.version, &from.algorithm, &from.backend, &from.adapter].map(|text| escaped(text));
+    write!(text, "  made         {date} by haptize {version}: {algorithm}")?;
     // Measured torques were not solved for: they have no residual.
     if from.tolerance > 0.0 {
         write!(text, " to {:.0e}", from.tolerance)?;
     }
-    writeln!(text, " on {} ({})", from.backend, from.adapter)
+    writeln!(text, " on {backend} ({adapter})")
 }
 
 /// Writes how much a contact point feels the mesh, and what to do about it.

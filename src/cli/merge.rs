@@ -7,6 +7,7 @@ use super::{
     output::{self, Kind},
     tell, watch,
 };
+use crate::names::escaped;
 use crate::sweep::{Merge, MergeError, Merged, Progress, Sweep, ranges};
 use std::{
     fmt::Write,
@@ -93,7 +94,10 @@ fn describe(file: &Path, merged: &Merged) -> Result<String, Failure> {
     writeln!(
         text,
         "  merged       in {:.2} s, {} on {} ({})",
-        report.seconds, report.algorithm, report.backend, report.adapter
+        report.seconds,
+        escaped(&report.algorithm),
+        escaped(&report.backend),
+        escaped(&report.adapter)
     )?;
     watch::lowered(&mut text, report.lowered)?;
     info::error(&mut text, report.error.as_ref(), None)?;

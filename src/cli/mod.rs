@@ -60,11 +60,13 @@ mod watch;
 pub use memory::Remembering;
 
 use crate::{
+    names,
     render::trace::Tick,
     sweep::{OTHER_ADAPTER, remedied},
 };
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::{
+    borrow::Cow,
     error::Error,
     ffi::OsString,
     io::{self, ErrorKind, Write},
@@ -278,17 +280,10 @@ fn telling_faults(next: &mut dyn FnMut(&Tick)) -> impl FnMut(&Tick) {
     }
 }
 
-/// Returns `text` with its control characters spelt as `\u001b`: names and texts of files must not command a terminal.
-fn printable(text: &str) -> String {
-    let mut printable = String::with_capacity(text.len());
-    for c in text.chars() {
-        if c.is_control() && c != '\n' {
-            printable += &format!("\\u{:04x}", u32::from(c));
-        } else {
-            printable.push(c);
-        }
-    }
-    printable
+/// Returns `text`, which has lines, with other control characters spelt as `\u001b`: names and texts of files must not command
+/// a terminal.
+fn printable(text: &str) -> Cow<'_, str> {
+    names::escaped_but(text, &['\n'])
 }
 
 /// Starts the threads that all work shares: where the system gives none, this is an error here and a panic later.
@@ -356,8 +351,8 @@ mod tests {
 
     #[test]
     fn nothing_that_is_printed_commands_a_terminal() {
-        let text = "a\u{1b}[31mred\u{7}\r\u{9b}2J\tz\nä";
-        assert_eq!(printable(text), "a\\u001b[31mred\\u0007\\u000d\\u009b2J\\u0009z\nä");
+        let text = "a\u{1b}[31mred\u{7}\r\u{9b}2J\tz\nä\u{202e}\u{2028}";
+        assert_eq!(printable(text), "a\\u001b[31mred\\u0007\\u000d\\u009b2J\\u0009z\nä\\u202e\\u2028");
         // The same escapes are JSON's.
         let json = serde_json::json!({ "error": text }).to_string();
         assert_eq!(serde_json::from_str::<serde_json::Value>(&printable(&json)).unwrap()["error"], text);

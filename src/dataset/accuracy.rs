@@ -1,5 +1,6 @@
 //! The error of a dataset, as its bake measured it.
 
+use crate::names::escaped;
 use serde::{Deserialize, Serialize};
 
 /// Errors of the torque at random configurations, against the lowest equilibrium that is found there directly: in the
@@ -80,7 +81,7 @@ impl MeasuredError {
         let line = |error: &InterpolationError| {
             let InterpolationError { interpolation, median, rms, worst } = error;
             let [median, rms, worst] = [*median, *rms, *worst].map(percent);
-            format!("`{interpolation}` {rms} rms, median {median}, worst {worst}")
+            format!("`{}` {rms} rms, median {median}, worst {worst}", escaped(interpolation))
         };
         errors.into_iter().map(line).collect()
     }

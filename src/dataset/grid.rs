@@ -1,6 +1,6 @@
 //! The uniform grid over C-space.
 
-use crate::{JointVector, MAX_JOINTS, csv::plain, scene::effort_unit};
+use crate::{JointVector, MAX_JOINTS, csv::plain, names, scene::effort_unit};
 use serde::{Deserialize, Serialize};
 
 /// Grid coordinates `start + k step`, `k < count`, of one joint.
@@ -106,6 +106,7 @@ impl Grid {
         let mut points = 1_usize;
         for axis in &self.axes {
             let name = &axis.name;
+            names::check(name)?;
             if axis.unit != "rad" && axis.unit != "m" {
                 return Err(format!("axis {name} has unit {:?}, not rad or m", axis.unit));
             }

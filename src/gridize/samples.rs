@@ -1,6 +1,6 @@
 //! Scattered measurements of a contact torque: what a scan or an imported log hands to the gridization.
 
-use crate::{MAX_JOINTS, dataset::JointLabel, random::mix};
+use crate::{MAX_JOINTS, dataset::JointLabel, names, random::mix};
 
 /// Scattered configurations q with the contact torque tau measured at each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,6 +32,9 @@ pub enum SamplesError {
         /// The length of the configurations.
         need: usize,
     },
+    /// A name that cannot be printed.
+    #[error("a joint: {0}")]
+    Name(String),
     /// NaN or an infinity.
     #[error(
         "sample {sample} has {what} {value} at joint `{joint}`: remove it, or let the import drop rows that are not \
@@ -94,6 +97,7 @@ impl Samples {
         if !(1..=MAX_JOINTS).contains(&joints) {
             return Err(SamplesError::Joints(joints));
         }
+        self.joints.iter().try_for_each(|joint| names::check(&joint.name)).map_err(SamplesError::Name)?;
         let need = self.configurations.len() / joints * joints;
         let columns = [("the configuration", Some(&self.configurations)), ("the torque", Some(&self.torques))];
         let deviation = [("the standard deviation", self.deviations.as_ref())];

@@ -1,7 +1,7 @@
 //! Whether the values of a column mapping can be, and where in its file stands one that cannot.
 
 use super::mapping::{ColumnName, Joint, Keep, Mapping};
-use crate::MAX_JOINTS;
+use crate::{MAX_JOINTS, names};
 use std::ops::Range;
 use toml::{
     Spanned,
@@ -88,6 +88,7 @@ impl Mapping {
 /// Checks joint `number` against those before it.
 fn check_joint(before: &[Joint], number: usize, joint: &Joint) -> Result<(), Refusal> {
     let name = &joint.name;
+    names::check(name).or_else(|why| refuse(true, format!("joint.{number}.name"), why))?;
     let twin = before.iter().any(|other| other.name == *name);
     let message = format!("joint name `{name}` is empty or used twice");
     refuse(twin || name.is_empty(), format!("joint.{number}.name"), message)?;

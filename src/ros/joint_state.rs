@@ -1,6 +1,7 @@
 //! `sensor_msgs/msg/JointState`.
 
 use super::cdr::{Decoder, Encoder};
+use crate::names;
 
 /// Text of the message's definition, as MCAP files carry it. Field names and types are those of ROS 2.
 pub(super) const SCHEMA: &str = "\
@@ -68,6 +69,7 @@ impl JointState {
             velocity: decoder.f64s()?,
             effort: decoder.f64s()?,
         };
+        state.names.iter().try_for_each(|name| names::check(name))?;
         for (what, values) in
             [("positions", &state.position), ("velocities", &state.velocity), ("efforts", &state.effort)]
         {
@@ -167,5 +169,10 @@ mod tests {
         }
         let odd = JointState { effort: vec![1.0], ..golden() };
         assert!(JointState::decode(&odd.encode()).unwrap_err().contains("1 efforts for 2 names"));
+        for name in ["a\nb", "a\u{2028}", "\u{202e}a"] {
+            let odd = JointState { names: vec!["j1".into(), name.into()], ..golden() };
+            let why = JointState::decode(&odd.encode()).unwrap_err();
+            assert!(why.contains("the name") && !why.contains(name), "{why}");
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::{
     chunk::{Chunk, LONGEST_RECORD},
     is_mcap,
 };
-use crate::input;
+use crate::{input, names::escaped};
 use mcap::{
     McapError,
     records::op,
@@ -145,7 +145,8 @@ impl Topics {
                 let (channel, schema) = (record.u16()?, record.u16()?);
                 let (topic, encoding) = (record.text()?, record.text()?);
                 if self.schemas.contains(&schema) && encoding == MESSAGE_ENCODING.as_bytes() {
-                    self.channels.insert(channel, String::from_utf8_lossy(topic).into_owned());
+                    // It is printed, and chosen by as it is printed.
+                    self.channels.insert(channel, escaped(&String::from_utf8_lossy(topic)).into_owned());
                 }
             }
             op::MESSAGE => {

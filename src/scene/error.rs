@@ -1,5 +1,6 @@
 //! Errors of the scene file: where, what, and what to do, with the line and a caret under the place.
 
+use crate::names::is_disruptive;
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -54,8 +55,8 @@ impl Diagnostic {
         let column = text[line_start..start].chars().count();
         let inside = text[start..text.floor_char_boundary(span.end.max(start))].lines().next().unwrap_or("");
         let skipped = column.saturating_sub(EXCERPT_LEAD);
-        // Control characters would act on the terminal, and tabs would move the caret.
-        let printable = |c: char| if c.is_control() { ' ' } else { c };
+        // Some characters would act on the terminal, and tabs would move the caret.
+        let printable = |c: char| if is_disruptive(c) { ' ' } else { c };
         let excerpt: String = line_text.chars().skip(skipped).take(EXCERPT_WIDTH).map(printable).collect();
         let lead = column - skipped;
         let width = inside.chars().count().min(EXCERPT_WIDTH.saturating_sub(lead)).max(1);

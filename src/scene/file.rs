@@ -14,7 +14,7 @@ pub(super) type Vector = Spanned<[f64; 3]>;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneTable {
-    pub name: Option<String>,
+    pub name: Option<Spanned<String>>,
     pub object: Option<Spanned<ObjectTable>>,
     pub proxy: ProxyTable,
     pub contact: Option<Spanned<ContactTable>>,

@@ -15,6 +15,7 @@ use super::check::Checker;
 use super::error::SceneError;
 use super::file::{ContactTable, GraphicsEntry, GraphicsTable, NumberOr, SceneTable};
 use super::{Algorithm, ContactSpec, ContactSurface, GridSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
+use crate::names;
 use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to 1e-6
@@ -79,11 +80,14 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     // energy.
     let solved = table.contact.as_ref().is_some_and(|own| own.get_ref().algorithm != Some(Algorithm::Paper));
     let interpolation = if object.is_some() && solved { Interpolation::Potential } else { Interpolation::Linear };
-    let file_stem = checker.path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    if let Some(name) = &table.name {
+        names::check(name.get_ref()).map_err(|why| checker.error(name.span(), why))?;
+    }
+    let file_stem = checker.path.file_stem().map(|stem| names::escaped(&stem.to_string_lossy()).into_owned());
     Ok(Rendering {
         path: checker.path.to_owned(),
         text: checker.text.to_owned(),
-        name: table.name.clone().or(file_stem).unwrap_or_default(),
+        name: table.name.as_ref().map(|name| name.get_ref().clone()).or(file_stem).unwrap_or_default(),
         object,
         haptics: haptics::convert(checker, &table.haptics, joints, interpolation)?,
         graphics,
