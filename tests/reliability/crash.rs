@@ -268,6 +268,26 @@ fn a_full_disk_is_an_error_and_the_bake_continues_when_there_is_room() {
     }
 }
 
+#[test]
+#[cfg(unix)]
+fn an_export_to_a_full_disk_says_so_once_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    write_scene(folder.path(), OBJECTS[0].1, 40);
+    succeed(folder.path(), &bake("cpu"));
+    let names = || std::fs::read_dir(folder.path()).unwrap().count();
+    let before = names();
+    for format in ["npz", "hdf5", "csv"] {
+        for blocks in [1, 8, 40] {
+            let limit = format!("trap '' XFSZ; ulimit -f {blocks}");
+            let output = run_limited(folder.path(), &["export", "x.haptize", "--format", format], &limit);
+            let said = message(&output);
+            assert_eq!(output.status.code(), Some(1), "{format}, {blocks} blocks: {said}");
+            assert!(said.starts_with("haptize: ") && said.lines().count() == 1, "{format}, {blocks} blocks: {said}");
+            assert_eq!(names(), before);
+        }
+    }
+}
+
 /// Bakes with so many kB of address space. Returns whether that was enough; where it was not, an error of the program
 /// must tell, unless the system finds no room to load the program at all.
 #[cfg(target_os = "linux")]

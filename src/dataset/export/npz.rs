@@ -12,7 +12,7 @@ use super::{
 use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
 use safetensors::Dtype;
 use std::{
-    io::{self, Seek, Write},
+    io::{self, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
@@ -21,9 +21,61 @@ use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 const ARRAY_HEADER: u64 = 1 << 16;
 
 pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
-    replace_file(path, |writer| write(dataset, ZipWriter::new(writer)))
+    replace_file(path, |writer| write(dataset, ZipWriter::new(Quiet::new(writer))))
         .map_err(|source| Error::Write { path: path.into(), source })?;
     Ok(vec![path.into()])
+}
+
+/// An output that fails once: afterwards nothing is written, and all is well. An archive that is dropped unfinished would be
+/// finished in vain, and `zip` would print so.
+struct Quiet<W> {
+    out: W,
+    position: u64,
+    end: u64,
+    failed: bool,
+}
+
+impl<W> Quiet<W> {
+    /// `out` is at the beginning of a file that is empty.
+    fn new(out: W) -> Self {
+        Self { out, position: 0, end: 0, failed: false }
+    }
+
+    /// Does `work` on the output unless it has failed.
+    fn unless_failed<T>(&mut self, or: T, work: impl FnOnce(&mut W) -> io::Result<T>) -> io::Result<T> {
+        if self.failed {
+            return Ok(or);
+        }
+        let done = work(&mut self.out);
+        self.failed = done.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
+        done
+    }
+}
+
+impl<W: Write> Write for Quiet<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.unless_failed(bytes.len(), |out| out.write(bytes))?;
+        self.position += written as u64;
+        self.end = self.end.max(self.position);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.unless_failed((), W::flush)
+    }
+}
+
+impl<W: Seek> Seek for Quiet<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let place = match to {
+            SeekFrom::Start(place) => Some(place),
+            SeekFrom::Current(by) => self.position.checked_add_signed(by),
+            SeekFrom::End(by) => self.end.checked_add_signed(by),
+        };
+        let place = place.ok_or(io::ErrorKind::InvalidInput)?;
+        self.position = self.unless_failed(place, |out| out.seek(SeekFrom::Start(place)))?;
+        Ok(self.position)
+    }
 }
 
 fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Result<()> {
@@ -101,4 +153,57 @@ fn stream<W: Write + Seek, T: npyz::Serialize>(
     let mut writer = npyz::WriteOptions::new().dtype(kind).shape(&shape).writer(zip).begin_nd()?;
     writer.extend(values)?;
     writer.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    /// Room for so many bytes.
+    struct Full(Cursor<Vec<u8>>, usize);
+
+    impl Write for Full {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.0.position() as usize + bytes.len() > self.1 {
+                return Err(io::ErrorKind::StorageFull.into());
+            }
+            self.0.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Seek for Full {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.0.seek(to)
+        }
+    }
+
+    #[test]
+    fn an_archive_on_a_full_disk_fails_once_and_is_finished_in_silence() {
+        let contents = |zip: &mut ZipWriter<Quiet<Full>>| {
+            (0..3).try_for_each(|k| array(zip, &format!("a{k}"), &[100], &[k as f64; 100]))
+        };
+        let whole = {
+            let mut zip = ZipWriter::new(Quiet::new(Full(Cursor::default(), usize::MAX)));
+            contents(&mut zip).unwrap();
+            zip.finish().unwrap().out.0.into_inner()
+        };
+        assert_eq!(zip::ZipArchive::new(Cursor::new(&whole[..])).unwrap().len(), 3);
+        for room in (0..whole.len()).step_by(7) {
+            let mut zip = ZipWriter::new(Quiet::new(Full(Cursor::default(), room)));
+            match contents(&mut zip) {
+                Err(error) => {
+                    assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{room}");
+                    // As where it is dropped.
+                    assert!(zip.finish().is_ok(), "{room}");
+                }
+                // There is no room for the directory: the second time, where it is dropped, all is well.
+                Ok(()) => assert!(zip.finish().is_err(), "{room}"),
+            }
+        }
+    }
 }
