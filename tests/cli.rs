@@ -614,6 +614,20 @@ fn a_plan_has_lines_for_schedulers_that_a_shell_takes() {
         assert!(checked.success(), "{line}");
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "a plan writes nothing");
+
+    // Names like options: the lines run.
+    std::fs::rename(folder.path().join("my finger.toml"), folder.path().join("-x.toml")).unwrap();
+    let plan = json(folder.path(), &["plan", "./-x.toml", "--shards", "2", "--cores", "2", "--json"]);
+    let lines: Vec<String> = serde_json::from_value(plan["lines"]["parallel"].clone()).unwrap();
+    let (program, bake) = (Path::new(env!("CARGO_BIN_EXE_haptize")), lines[0].split_once("--retries 3 ").unwrap().1);
+    let script = format!(
+        "PATH={}:$PATH; for k in 0 1; do eval \"$(echo {bake} | sed s/{{}}/$k/)\"; done; {}",
+        program.parent().unwrap().display(),
+        lines[1]
+    );
+    let ran = Command::new("sh").args(["-e", "-c", &script]).current_dir(folder.path()).output().unwrap();
+    assert!(ran.status.success(), "{script}: {}", text(&ran.stderr));
+    assert!(folder.path().join("-x.haptize").exists());
 }
 
 /// The finger without its grid, and a comment that is to survive.

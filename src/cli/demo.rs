@@ -4,7 +4,7 @@
 //! The press runs twice: as fast as it goes, which gives the same trace and figures on every machine, and against the
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
-use super::{Failure, Report, motion, output::Folder, played, tell, watch};
+use super::{Failure, Report, motion, output::Folder, played, shell, tell, watch};
 use crate::{
     dataset::Dataset,
     render::{realtime::Options, setup::Setup},
@@ -77,7 +77,7 @@ pub fn run() -> Result<Report, Failure> {
         played::describe_timing(&mut text, timing)?;
     }
     writeln!(text, "written: {}", names.join(" "))?;
-    writeln!(text, "next: haptize info {0}, haptize play {0} --motion scrape, haptize --help", file.display())?;
+    writeln!(text, "next: haptize info {0}, haptize play {0} --motion scrape, haptize --help", shell::file(&file))?;
     let mut json = serde_json::json!({ "bake": sweep, "press": press, "timing": played.timing, "files": names });
     earlier.close(&files, &mut text, &mut json)?;
     Ok(Report { text, json, whole: true })

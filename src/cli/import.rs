@@ -1,6 +1,7 @@
 //! `haptize import`: a robot's file becomes a scene.
 
-use super::{Failure, Report, tell};
+use super::{Failure, Report, shell, tell};
+use crate::names::escaped;
 use crate::urdf::{self, Arm, Lock, Robot};
 use std::{
     fmt::Write as _,
@@ -82,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             format!("{:?}", joint.kind).to_lowercase()
         )?;
     }
-    writeln!(text, "  next         haptize bake {}", output.display())?;
+    writeln!(text, "  next         haptize bake {}", shell::file(&output))?;
     let json = serde_json::json!({
         "file": output.display().to_string(),
         "joints": arm.joints.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>(),
@@ -94,10 +95,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
 
 /// The command line again, for the head of the scene; files without their folders.
 fn command(arguments: &Arguments) -> String {
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut command = format!("haptize import {} --tip {}", name(&arguments.robot), arguments.tip);
-    arguments.lock.iter().for_each(|Lock { joint, value }| command += &format!(" --lock {joint}={value}"));
-    command + &format!(" --spacing {}", arguments.spacing)
+    let robot = shell::file(Path::new(arguments.robot.file_name().unwrap_or_default()));
+    let mut command = format!("haptize import {robot} {}", shell::option("--tip", &arguments.tip));
+    for Lock { joint, value } in &arguments.lock {
+        command += &format!(" {}", shell::option("--lock", &format!("{joint}={value}")));
+    }
+    // It stays on one line.
+    escaped(&format!("{command} --spacing {}", arguments.spacing)).into_owned()
 }
 
 /// Writes a new file. A scene that is there may hold the work of a person, and is left as it is.

@@ -53,6 +53,7 @@ mod reach;
 mod refine;
 mod scan;
 mod shard;
+mod shell;
 mod stability;
 mod view;
 mod watch;

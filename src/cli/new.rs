@@ -1,6 +1,6 @@
 //! `haptize new`: a commented scene to begin with, one of those that are part of the program.
 
-use super::{Failure, Report};
+use super::{Failure, Report, shell};
 use crate::dataset::replace_file;
 use clap::ValueEnum;
 use std::{
@@ -91,10 +91,10 @@ impl Example {
 
     /// The command that the file `scene` is for.
     fn next(self, scene: &Path) -> String {
-        let (file, explored) = (scene.display(), scene.with_extension("haptize"));
+        let [file, explored] = [scene, &scene.with_extension("haptize")].map(shell::file);
         match self {
             _ if self.is_scanned() => format!("haptize scan {file}"),
-            Self::Organ => format!("haptize play {file} --on-demand {}", explored.display()),
+            Self::Organ => format!("haptize play {file} --on-demand {explored}"),
             _ => format!("haptize bake {file}"),
         }
     }

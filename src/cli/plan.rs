@@ -1,6 +1,6 @@
 //! `haptize plan`: what each shard of a bake is going to take, and lines that start them all.
 
-use super::{Failure, Report, interrupt, watch};
+use super::{Failure, Report, interrupt, shell, watch};
 use crate::{
     scene::Scene,
     sweep::{BackendChoice, Plan},
@@ -67,8 +67,8 @@ impl Lines {
         let last = count - 1;
         let stem = arguments.scene.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let [scene, folder, dataset] =
-            [arguments.scene.display().to_string(), format!("{stem}-shards"), format!("{stem}.haptize")]
-                .map(|word| quoted(&word));
+            [arguments.scene.clone(), format!("{stem}-shards").into(), format!("{stem}.haptize").into()]
+                .map(|path: PathBuf| shell::file(&path));
         let backend = if plan.backend == "gpu" { " --backend gpu" } else { " --backend cpu" };
         let bake = |shard: &str| format!("haptize bake {scene} --shard {shard}/{count}{backend} -o {folder}");
         let merge = format!("haptize merge {folder} -o {dataset}");
@@ -80,7 +80,7 @@ impl Lines {
         let time = time.unwrap_or_default();
         let gpu = if plan.backend == "gpu" { " --gpus=1" } else { "" };
         // A shell takes a word in single quotes as it is; what is quoted within needs other quotes.
-        let wrap = |line: &str| quoted(line);
+        let wrap = |line: &str| shell::word(line);
         Self {
             slurm: vec![
                 format!(
@@ -94,7 +94,7 @@ impl Lines {
                 ),
             ],
             parallel: vec![
-                format!("seq 0 {last} | RAYON_NUM_THREADS=1 parallel --retries 3 {}", quoted(&bake("{}"))),
+                format!("seq 0 {last} | RAYON_NUM_THREADS=1 parallel --retries 3 {}", shell::word(&bake("{}"))),
                 merge.clone(),
             ],
             hyperqueue: vec![
@@ -102,16 +102,6 @@ impl Lines {
                 merge,
             ],
         }
-    }
-}
-
-/// `word` as a shell takes it for one word.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./+,:=".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
     }
 }
 
@@ -156,16 +146,4 @@ fn describe(text: &mut String, plan: &Plan, arguments: &Arguments, lines: &Lines
         lines.iter().try_for_each(|line| writeln!(text, "  {line}"))?;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        assert_eq!(quoted("arm.toml"), "arm.toml");
-        assert_eq!(quoted("my arm.toml"), "'my arm.toml'");
-        assert_eq!(quoted("it's $HOME"), "'it'\\''s $HOME'");
-    }
 }

@@ -8,7 +8,7 @@ use super::{
     output::{self, Earlier, Folder, Kind as FileKind},
     playback_report::{Beside, PlaybackReport},
     played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, play_timed, traced, unwritten, write},
-    tell,
+    shell, tell,
     watch::warn_of_free_space,
 };
 use crate::{
@@ -398,7 +398,7 @@ fn load(path: &Path) -> Result<Dataset, Failure> {
         dataset::Error::Foreign { .. } if Scene::load(path).is_ok() => format!(
             "{}: is a scene: bake it first (haptize bake), or feel it at once (haptize play {} --on-demand FILE)",
             path.display(),
-            path.display()
+            shell::file(path)
         )
         .into(),
         error => error.into(),

@@ -6,7 +6,7 @@ use super::{
     interrupt,
     keyboard::Keyboard,
     output::{self, Kind},
-    tell,
+    shell, tell,
 };
 use crate::{
     JointVector,
@@ -101,8 +101,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if !report.whole {
         text += &format!(
             "  interrupted; continue: haptize scan {} -o {} --resume\n",
-            arguments.scene.display(),
-            output.display()
+            shell::file(&arguments.scene),
+            shell::file(&output)
         );
     }
     Ok(Report { text, json, whole: report.whole })
