@@ -130,10 +130,14 @@ impl Replacement {
     /// Makes the temporary file of `target`.
     ///
     /// # Errors
-    /// Those of the system, here and below.
+    /// Those of the system, here and below; and where the file is there and may not be written to, though the system lets it be
+    /// replaced.
     pub fn begin<'a>(target: impl Into<Target<'a>>) -> io::Result<Self> {
         let Target { path, growing } = target.into();
         let path = resolved(path)?;
+        if fs::metadata(&path).is_ok_and(|there| there.permissions().readonly()) {
+            return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is there and may not be written to"));
+        }
         let temporary = match growing {
             Some(growing) => {
                 clear(growing)?;
@@ -265,6 +269,23 @@ mod tests {
         replace_file(&path, |w| w.write_all(b"new")).unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(names(folder.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn a_file_that_may_not_be_written_to_is_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bin");
+        std::fs::write(&path, b"old").unwrap();
+        let writable = std::fs::metadata(&path).unwrap().permissions();
+        let mut read_only = writable.clone();
+        read_only.set_readonly(true);
+        std::fs::set_permissions(&path, read_only).unwrap();
+        let refused = replace_file(&path, |w| w.write_all(b"new")).unwrap_err();
+        assert_eq!(refused.kind(), io::ErrorKind::PermissionDenied);
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["a.bin"]);
+        std::fs::set_permissions(&path, writable).unwrap();
+        replace_file(&path, |w| w.write_all(b"new")).unwrap();
     }
 
     #[cfg(unix)]
