@@ -37,8 +37,12 @@ fn names_and_texts_of_files_do_not_command_the_terminal() {
         dataset.provenance.backend = escape.into();
         dataset.provenance.notices = vec![escape.into()];
         dataset.provenance.algorithm = escape.into();
-        dataset.grid.axes[0].name = escape.into();
     });
+    // A name is refused, as it is in a file.
+    let mut named = Dataset::load(&home.path().join("x.haptize")).unwrap();
+    named.grid.axes[0].name = escape.into();
+    let refused = named.save(&home.path().join("named.haptize")).unwrap_err().to_string();
+    assert!(refused.contains("U+001B") && !refused.contains('\u{1b}'), "{refused}");
     std::fs::write(home.path().join("escape.toml"), format!("name = \"{escape}\"\n[{escape}]")).unwrap();
     std::fs::write(home.path().join("escape.csv"), format!("{escape},1\n{escape}")).unwrap();
     for arguments in [
