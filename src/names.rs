@@ -1,10 +1,10 @@
-//! Names from files: of joints, scenes, topics, devices. They are printed in lines and tables, where some characters would forge
-//! a line, hide what stands beside them or command a terminal.
+//! Names from files: of joints, scenes, topics, devices. They are printed in lines and tables, where some characters
+//! would forge a line, hide what stands beside them or command a terminal.
 
 use std::borrow::Cow;
 
-/// Whether `c` does more than to be seen: a control character, an end of a line or a paragraph, or one that changes the direction
-/// of text.
+/// Whether `c` does more than to be seen: a control character, an end of a line or a paragraph, or one that changes the
+/// direction of text.
 pub(crate) fn is_disruptive(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') || turns

@@ -228,8 +228,8 @@ unsafe fn told_size<T: Extensible>(structure: *const T) -> Option<usize> {
     (size >= T::FIRST_SIZE).then_some(size)
 }
 
-/// A copy of the structure at `structure`, with the defaults of entries that an earlier header did not have; `None` where
-/// it is NULL or its size is not told or too small.
+/// A copy of the structure at `structure`, with the defaults of entries that an earlier header did not have; `None`
+/// where it is NULL or its size is not told or too small.
 ///
 /// # Safety
 /// As for [`Told::new`]; nobody writes the structure meanwhile.

@@ -1,4 +1,4 @@
-"""A process that was forked, as multiprocessing does on Linux up to Python 3.13: threads that the parent had begun are not there."""
+"""A forked process, as multiprocessing makes on Linux up to Python 3.13: threads that the parent had begun are not there."""
 
 import multiprocessing
 import sys
@@ -57,10 +57,10 @@ def works(scene, dataset, field, solver, many, folder):
         return haptize.bake(scene, backend="cpu", measure_error=5).torque.copy()
 
     def baked_to_a_file():
-        told = []
-        haptize.bake(scene, folder / "baked.haptize", backend="cpu", measure_error=0, progress=lambda *done: told.append(done))
+        told, file = [], folder / "baked.haptize"
+        haptize.bake(scene, file, backend="cpu", measure_error=0, progress=lambda *done: told.append(done))
         assert told
-        return haptize.Dataset.load(folder / "baked.haptize").torque.copy()
+        return haptize.Dataset.load(file).torque.copy()
 
     def figures():
         return len(dataset.figures(folder))

@@ -281,8 +281,8 @@ fn telling_faults(next: &mut dyn FnMut(&Tick)) -> impl FnMut(&Tick) {
     }
 }
 
-/// Returns `text`, which has lines, with other control characters spelt as `\u001b`: names and texts of files must not command
-/// a terminal.
+/// Returns `text`, which has lines, with other control characters spelt as `\u001b`: names and texts of files must not
+/// command a terminal.
 fn printable(text: &str) -> Cow<'_, str> {
     names::escaped_but(text, &['\n'])
 }

@@ -130,8 +130,8 @@ impl Replacement {
     /// Makes the temporary file of `target`.
     ///
     /// # Errors
-    /// Those of the system, here and below; and where the file is there and may not be written to, though the system lets it be
-    /// replaced.
+    /// Those of the system, here and below; and where the file is there and may not be written to, though the system
+    /// lets it be replaced.
     pub fn begin<'a>(target: impl Into<Target<'a>>) -> io::Result<Self> {
         let Target { path, growing } = target.into();
         let path = resolved(path)?;

@@ -33,7 +33,8 @@ const CONFIGURATIONS: Range<usize> = 100..1000;
 /// Seed of the random configurations; differs from the pilot's.
 const SEED: u64 = 0x94d0_49bb_1331_11eb;
 
-/// Most random configurations that may be asked for (1): their rms is good to a thousandth. More would take memory, and days.
+/// Most random configurations that may be asked for (1): their rms is good to a thousandth. More would take memory, and
+/// days.
 pub const MOST_CONFIGURATIONS: usize = 1_000_000;
 
 /// Configurations that are drawn at a time (1): more takes memory, less goes through the grid oftener. Room for
@@ -161,8 +162,8 @@ fn interpolated(
     places.par_iter().map(around).collect()
 }
 
-/// Random configurations, evenly spread over the cells with a corner in contact, at most `count` of them, of which `together` are
-/// drawn at a time.
+/// Random configurations, evenly spread over the cells with a corner in contact, at most `count` of them, of which
+/// `together` are drawn at a time.
 fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize, together: usize) -> Vec<Place> {
     let mut random = Random::new(SEED);
     let (mut places, mut left) = (Vec::new(), (2 * count) << grid.joints());

@@ -26,8 +26,8 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
     Ok(vec![path.into()])
 }
 
-/// An output that fails once: afterwards nothing is written, and all is well. An archive that is dropped unfinished would be
-/// finished in vain, and `zip` would print so.
+/// An output that fails once: afterwards nothing is written, and all is well. An archive that is dropped unfinished
+/// would be finished in vain, and `zip` would print so.
 struct Quiet<W> {
     out: W,
     position: u64,
