@@ -7,7 +7,7 @@
 //! ignored.
 
 use super::{Failure, last_words};
-use crate::dataset::discard_unfinished;
+use crate::{dataset::discard_unfinished, device::serial};
 use std::{
     sync::{
         Mutex, PoisonError,
@@ -81,8 +81,8 @@ pub fn stop_flag() -> &'static AtomicBool {
     &STOP
 }
 
-/// Returns [`stop_flag`] for work that drives a device: from now on every signal that would end or stop the program, and
-/// that a program may answer, raises it, so that zero torque goes out first. Ctrl-\\ and Ctrl-Z are among them.
+/// Returns [`stop_flag`] for work that drives a device. From now on every signal raises it that would end or stop the
+/// program and can be answered, Ctrl-\\ and Ctrl-Z among them: zero torque goes out first.
 pub fn stop_flag_of_device() -> &'static AtomicBool {
     hear_all();
     stop_flag()
@@ -106,6 +106,8 @@ pub fn over() {
 
 /// Ends the program. Whoever holds standard output may be waiting for its reader: that must not hold this up.
 fn end(json: bool, resumes: bool) {
+    // The loop may not have had a tick since the signal, as where two come together.
+    serial::let_go();
     discard_unfinished();
     let (told, done) = mpsc::channel();
     let speak = move || {

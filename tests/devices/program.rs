@@ -282,10 +282,20 @@ impl crate::emulator::Firmware for Watched {
     }
 }
 
-/// Plays in `folder` with an emulated 2DIY, and sends `signal` once it is pushed. Returns what came of it, when the signal
-/// was sent, and the commands.
+/// A folder with the dataset of an arm of two slides.
 #[cfg(unix)]
-fn signalled(folder: &Path, signal: Signal) -> (std::process::Output, Instant, Sent) {
+fn slides() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), SLIDES).unwrap();
+    let baked = haptize(folder.path(), &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]);
+    assert_eq!(baked.status.code(), Some(0));
+    folder
+}
+
+/// Plays in `folder` with an emulated 2DIY, and sends `signals` once it is pushed, all at once. Returns what came of it, when the
+/// signal was sent, and the commands.
+#[cfg(unix)]
+fn signalled(folder: &Path, signals: &'static [Signal]) -> (std::process::Output, Instant, Sent) {
     use std::{os::unix::process::CommandExt, process::Stdio};
     let middle = haptize::JointVector::from_slice(&[168.25_f64.to_radians(), 12.5_f64.to_radians()]);
     let sent = Sent::default();
@@ -302,7 +312,9 @@ fn signalled(folder: &Path, signal: Signal) -> (std::process::Output, Instant, S
         // SAFETY: the call is one that may be made between fork and exec.
         unsafe {
             play.pre_exec(move || {
-                libc::signal(signal.as_raw(), libc::SIG_DFL);
+                for signal in signals {
+                    libc::signal(signal.as_raw(), libc::SIG_DFL);
+                }
                 Ok(())
             })
         };
@@ -317,7 +329,9 @@ fn signalled(folder: &Path, signal: Signal) -> (std::process::Output, Instant, S
         }
         let signalled = Instant::now();
         // It may have ended by itself: below.
-        let _ = kill_process(Pid::from_child(&play), signal);
+        for signal in signals {
+            let _ = kill_process(Pid::from_child(&play), *signal);
+        }
         (play.wait_with_output().unwrap(), signalled)
     });
     (output, signalled, sent)
@@ -326,7 +340,7 @@ fn signalled(folder: &Path, signal: Signal) -> (std::process::Output, Instant, S
 /// With how many commands a device is still pushed after `signal`; nothing where it did not answer in time, or the loop
 /// faulted, as they do when the machine holds one of the two processes up for 10 ms.
 #[cfg(unix)]
-fn pushed_after(folder: &Path, signal: Signal) -> Option<usize> {
+fn pushed_after(folder: &Path, signal: &'static [Signal]) -> Option<usize> {
     let (output, signalled, sent) = signalled(folder, signal);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     let report = json(&output);
@@ -357,11 +371,10 @@ fn pushed_after(folder: &Path, signal: Signal) -> Option<usize> {
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = slides();
     let path = folder.path();
-    std::fs::write(path.join("s.toml"), SLIDES).unwrap();
-    assert_eq!(haptize(path, &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]).status.code(), Some(0));
-    for signal in [Signal::INT, Signal::TERM, Signal::QUIT, Signal::TSTP, Signal::USR1] {
+    const SIGNALS: [Signal; 5] = [Signal::INT, Signal::TERM, Signal::QUIT, Signal::TSTP, Signal::USR1];
+    for signal in SIGNALS.chunks(1) {
         let (mut ticks, begin) = (Vec::new(), Instant::now());
         while begin.elapsed() < LONGEST_UNREST && !ticks.iter().any(|ticks| *ticks <= 2) {
             ticks.extend(pushed_after(path, signal));
@@ -371,30 +384,33 @@ fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
     }
 }
 
-/// The 2DIY has no watchdog: it keeps the last torque. A crash leaves the guard no time, nor does memory that runs out.
+/// The 2DIY has no watchdog: it keeps the last torque. A crash leaves the guard no time, nor do signals that come
+/// together, of which the second ends the program at once.
 #[cfg(unix)]
 #[test]
-fn the_last_command_before_a_crash_is_zero_torque() {
+fn the_last_command_of_a_program_that_ends_at_once_is_zero_torque() {
     use std::os::unix::process::ExitStatusExt;
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path();
-    std::fs::write(path.join("s.toml"), SLIDES).unwrap();
-    assert_eq!(haptize(path, &["bake", "s.toml", "-o", "s.haptize", "--backend", "cpu"]).status.code(), Some(0));
-    for signal in [Signal::SEGV, Signal::ABORT] {
+    let folder = slides();
+    let together: &'static [Signal] = &[Signal::HUP, Signal::TERM, Signal::HUP];
+    for signals in [&[Signal::SEGV][..], &[Signal::ABORT], together] {
         let begin = Instant::now();
-        // Once at least it is pushed when the signal comes, and not let go of before.
+        // Once at least it is pushed when the signals come, and not let go of before.
         let was_pushed = loop {
-            let (output, at, sent) = signalled(path, signal);
+            let (output, at, sent) = signalled(folder.path(), signals);
             let sent = sent.lock().unwrap();
             let before = sent.iter().take_while(|(sent, _)| *sent <= at).last();
-            if before.is_some_and(|(_, torque)| *torque > 0.02) && output.status.signal() == Some(signal.as_raw()) {
-                assert_eq!(sent.last().unwrap().1, 0.0, "signal {signal:?}");
+            let ended = match signals {
+                [signal] => output.status.signal() == Some(signal.as_raw()),
+                _ => output.status.code() == Some(130),
+            };
+            if before.is_some_and(|(_, torque)| *torque > 0.02) && ended {
+                assert_eq!(sent.last().unwrap().1, 0.0, "signals {signals:?}");
                 break true;
             }
             if begin.elapsed() > LONGEST_UNREST {
                 break false;
             }
         };
-        assert!(was_pushed, "signal {signal:?}");
+        assert!(was_pushed, "signals {signals:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! The last command to every open line where the process ends without the guard: zero torque.
 //!
-//! Each open line has a place in a fixed table, with the message that commands zero. [`let_go`] writes these messages. It
-//! allocates nothing and locks nothing, so that it may be called in a signal handler.
+//! Each open line has a place in a fixed table, with the message that commands zero. [`let_go`] writes these messages.
+//! It allocates nothing and locks nothing, so that it may be called in a signal handler.
 
 use super::LONGEST;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicUsize, Ordering};

@@ -19,6 +19,8 @@ mod wooden_haptics;
 
 #[cfg(unix)]
 pub use last_command::let_go;
+#[cfg(not(unix))]
+pub use port::let_go;
 pub use port::{Port, ports};
 pub use two_diy::{TwoDiy, Version};
 pub use wooden_haptics::WoodenHaptics;
@@ -46,8 +48,9 @@ const LATEST_REPLY: f64 = 0.05;
 /// Longest message of any protocol (bytes).
 const LONGEST: usize = 128;
 
-/// Most bytes that are taken in a tick: the longest replies to all requests that are remembered. More: a line that floods
-/// holds up the loop. What is left when they have come is dropped, so that the last position ages, and torque goes.
+/// Most bytes that are taken in a tick: the longest replies to all requests that are remembered. More: a line
+/// that floods holds up the loop. What comes beyond them is dropped, so that the last position ages and the torque
+/// goes.
 const MOST_RECEIVED: usize = REMEMBERED * LONGEST;
 
 /// The reading by a protocol of the bytes that have come.

@@ -41,6 +41,9 @@ impl Port {
     }
 }
 
+/// Does nothing: no line is open.
+pub fn let_go() {}
+
 /// Returns nothing.
 #[must_use]
 pub fn ports() -> Vec<String> {
