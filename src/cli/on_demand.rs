@@ -140,19 +140,21 @@ impl Exploring {
         }
     }
 
-    /// Plays `device` against the clock while contact is solved where it goes. Hands over each tick soon after it.
+    /// Plays `device` against the clock while contact is solved where it goes, until `stop` is raised at the latest.
+    /// Hands over each tick soon after it.
     pub fn play(
         &self,
         haptics: &Haptics,
         device: &mut dyn Device,
         graphics: Option<&mut Graphics<'_>>,
         plan: &Plan,
+        stop: &AtomicBool,
         on_tick: &mut dyn FnMut(&Tick),
     ) -> Result<Played, Failure> {
         let start = *haptics.start(&device.read(0.0).position)?.proxy();
         let (live, exploration) = self.on_demand.begin(&start)?;
         let begun = self.began.elapsed().as_secs_f64();
-        let options = Options { stop: interrupt::stop_flag(), live: Some(live), on_tick: Some(on_tick) };
+        let options = Options { stop, live: Some(live), on_tick: Some(on_tick) };
         let played = play_timed(haptics, device, graphics, plan, options);
         let done = exploration.end()?;
         interrupt::over();

@@ -289,7 +289,7 @@ fn perform(
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     let (device, graphics) = (device.as_mut(), graphics.as_mut());
     match exploring {
-        Some(exploring) => exploring.play(&setup.haptics, device, graphics, &plan, on_tick),
+        Some(exploring) => exploring.play(&setup.haptics, device, graphics, &plan, interrupt::stop_flag(), on_tick),
         None => {
             let options = Options { on_tick: Some(on_tick), ..Options::default() };
             play_timed(&setup.haptics, device, graphics, &plan, options)
@@ -333,7 +333,7 @@ fn drive(
     // Last of all: the motors go on. They go off before anything is drawn.
     let mut device = attach(guard, address, setup.chain.clone(), &setup.scene)?;
     let played = match exploring {
-        Some(exploring) => exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, on_tick),
+        Some(exploring) => exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop, on_tick),
         None => {
             let options = Options { stop, on_tick: Some(on_tick), ..Options::default() };
             play_timed(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, options)
