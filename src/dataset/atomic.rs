@@ -149,6 +149,9 @@ impl Replacement {
                 locked_in(folder)?
             }
         };
+        // Before anything is written: nobody reads it who may not read the file that it replaces.
+        #[cfg(unix)]
+        take_over(&path, temporary.as_file());
         Ok(Self { _unfinished: Unfinished::begin(temporary.path()), path, temporary })
     }
 
@@ -160,8 +163,6 @@ impl Replacement {
 
     /// Lets it take its name.
     pub fn finish(self) -> io::Result<()> {
-        #[cfg(unix)]
-        take_over(&self.path, self.temporary.as_file())?;
         self.temporary.as_file().sync_all()?;
         self.temporary.persist(&self.path).map_err(|error| error.error)?;
         // The new name is to survive a power cut, too. The file is in its place by now, so that a folder that may not
@@ -172,18 +173,17 @@ impl Replacement {
     }
 }
 
-/// Gives `file` the permissions of the file at `path`, where there is one, and its owner and group as far as the system
-/// lets.
+/// Gives `file` the permissions of the file at `path`, where there is one, and its owner and group, as far as the
+/// system lets: not every file system has such, and who may replace a file need not be its owner.
 #[cfg(unix)]
-fn take_over(path: &Path, file: &File) -> io::Result<()> {
-    use std::os::unix::fs::{MetadataExt, fchown};
-    let Ok(earlier) = fs::metadata(path) else { return Ok(()) };
-    let made = file.metadata()?;
+fn take_over(path: &Path, file: &File) {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+    let (Ok(earlier), Ok(made)) = (fs::metadata(path), file.metadata()) else { return };
     if (made.uid(), made.gid()) != (earlier.uid(), earlier.gid()) {
-        // Only the superuser may give a file away; its permissions are then those of the new owner's file.
         let _ = fchown(file, Some(earlier.uid()), Some(earlier.gid()));
     }
-    file.set_permissions(earlier.permissions())
+    // Reading, writing and running alone: with another owner the other bits would mean something else.
+    let _ = file.set_permissions(fs::Permissions::from_mode(earlier.mode() & 0o777));
 }
 
 /// The folder of the file at `path`.
@@ -286,6 +286,24 @@ mod tests {
         assert_eq!(names(folder.path()), ["a.bin"]);
         std::fs::set_permissions(&path, writable).unwrap();
         replace_file(&path, |w| w.write_all(b"new")).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_replaces_a_private_file_is_private_from_its_first_byte_on() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bin");
+        std::fs::write(&path, b"old").unwrap();
+        // A set-user-ID bit is not taken over.
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o4600)).unwrap();
+        let mode = |file: &File| file.metadata().unwrap().permissions().mode() & 0o7777;
+        replace_file(&path, |w| {
+            assert_eq!(mode(w.get_ref()), 0o600);
+            w.write_all(b"new")
+        })
+        .unwrap();
+        assert_eq!(mode(&File::open(&path).unwrap()), 0o600);
     }
 
     #[cfg(unix)]
