@@ -20,8 +20,7 @@ pub fn named(setup: &Setup, dataset: &Dataset, name: &str, topic: Option<&str>) 
         file if is_mcap(Path::new(file)) => return recorded(setup, dataset, Path::new(file), topic),
         file if Path::new(file).exists() => {
             no_topic(topic, file)?;
-            let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
-            let motion = Motion::from_csv(Path::new(file), &names)?;
+            let motion = Motion::from_csv(Path::new(file), &labels(&dataset.grid))?;
             motion.check_limits(joints).map_err(|error| format!("{file}: {error}"))?;
             return Ok(motion);
         }

@@ -2,13 +2,14 @@
 //!
 //! Scenes give waypoints, joined by minimum-jerk paths (Flash and Hogan 1985), at rest at each of them:
 //! `q(s) = q_0 + (q_1 - q_0)(10 s^3 - 15 s^4 + 6 s^5)`, s from 0 to 1. Files give samples, joined by straight lines:
-//! one row a sample, comma-separated. A header names the columns, `time` and the joints in any order, each with its unit
-//! in brackets or without; other columns are passed over. Without a header a row is the time in seconds and then one
-//! coordinate per joint.
+//! one row a sample, comma-separated. A header names the columns, `time` and the joints in any order, each with its
+//! unit in brackets or without; other columns are passed over. Without a header a row is the time in seconds and then
+//! one coordinate per joint.
 
 use crate::{
     JointVector,
     csv::{fields, plain},
+    dataset::JointLabel,
     input::{self, GREATEST_INPUT},
     scene::{JointKind, JointSpec, Waypoint},
 };
@@ -138,14 +139,15 @@ impl Motion {
         if self.waypoints.is_empty() { Err(MotionError::Empty) } else { Ok(self) }
     }
 
-    /// Returns the motion in the comma-separated `file`, of the joints of these names, in their order. Empty lines and
-    /// lines that begin with # or % are passed over.
+    /// Returns the motion in the comma-separated `file`, of `joints` in their order. Empty lines and lines that begin
+    /// with
+    /// # or % are passed over.
     ///
     /// # Errors
     /// When the file cannot be read, its header does not name each joint once, or a line is not a sample; the error
     /// names file and line.
-    pub fn from_csv(file: &Path, names: &[String]) -> Result<Self, MotionError> {
-        let joints = names.len();
+    pub fn from_csv(file: &Path, labels: &[JointLabel]) -> Result<Self, MotionError> {
+        let joints = labels.len();
         let unreadable = |source| MotionError::Read { file: file.into(), source };
         let opened = input::open(file).map_err(unreadable)?;
         if opened.metadata().map_err(unreadable)?.len() > GREATEST_FILE {
@@ -169,7 +171,7 @@ impl Motion {
             }
             let Some(columns) = &columns else {
                 let is_header = fields(text, ',').all(|field| number_in(field).is_none());
-                let found = if is_header { Columns::named(text, names).map_err(bad)? } else { Columns::plain(joints) };
+                let found = if is_header { Columns::named(text, labels).map_err(bad)? } else { Columns::plain(joints) };
                 if !is_header {
                     waypoints.push(found.sample(text).map_err(bad)?);
                 }
@@ -280,14 +282,14 @@ impl Columns {
     }
 
     /// Those that `header` names.
-    fn named(header: &str, joints: &[String]) -> Result<Self, String> {
+    fn named(header: &str, joints: &[JointLabel]) -> Result<Self, String> {
         let columns: Vec<(&str, Option<&str>)> = fields(header, ',').map(heading).collect();
-        let find = |name: &str, units: &[&str]| {
+        let find = |name: &str, unit: &str| {
             // Tables of haptize hold plain names.
             let mut found = columns.iter().enumerate().filter(|(_, (known, _))| plain(known) == plain(name));
             match (found.next(), found.next()) {
-                (Some((_, (_, Some(unit)))), None) if !units.contains(unit) => {
-                    Err(format!("column {name} is in {}, not in {}", shown(unit), units.join(" or ")))
+                (Some((_, (_, Some(given)))), None) if *given != unit => {
+                    Err(format!("column {name} is in {}, not in {unit}", shown(given)))
                 }
                 (Some((column, _)), None) => Ok(column),
                 (None, _) => Err(format!(
@@ -297,8 +299,8 @@ impl Columns {
                 _ => Err(format!("several columns are called {name}")),
             }
         };
-        let time = find("time", &["s"])?;
-        let joints = joints.iter().map(|joint| find(joint, &["rad", "m"])).collect::<Result<_, _>>()?;
+        let time = find("time", "s")?;
+        let joints = joints.iter().map(|joint| find(&joint.name, &joint.unit)).collect::<Result<_, _>>()?;
         Ok(Self { count: columns.len(), time, joints })
     }
 
@@ -345,7 +347,8 @@ mod tests {
     fn read(text: &[u8]) -> Result<Motion, MotionError> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(text).unwrap();
-        Motion::from_csv(file.path(), &["shoulder".into(), "elbow".into()])
+        let label = |name: &str, unit: &str| JointLabel { name: name.into(), unit: unit.into() };
+        Motion::from_csv(file.path(), &[label("shoulder", "m"), label("elbow", "rad")])
     }
 
     #[test]
@@ -365,7 +368,7 @@ mod tests {
 
     #[test]
     fn a_file_gives_its_samples_and_lines_between_them() {
-        let text = b"# pressed by hand\ntime [s],shoulder [rad],elbow [rad]\n0,1,2\r\n\n0.5, 2 ,4\n1.5,2,-4e0\n";
+        let text = b"# pressed by hand\ntime [s],shoulder [m],elbow [rad]\n0,1,2\r\n\n0.5, 2 ,4\n1.5,2,-4e0\n";
         let motion = read(text).unwrap();
         assert_eq!(*motion.at(0.0).0, [1.0, 2.0]);
         assert_eq!(*motion.at(0.25).0, [1.5, 3.0]);
@@ -375,7 +378,7 @@ mod tests {
 
     #[test]
     fn hostile_files_are_refused_with_their_line() {
-        let cases: [(&[u8], &str); 15] = [
+        let cases: [(&[u8], &str); 16] = [
             (b"0,1,2\n1,2\n", ":2: 2 numbers"),
             (b"0,1,2,3\n", ":1: 4 numbers"),
             (b"0,1,2\n0,1,2\n", ":2: time 0 s does not come after"),
@@ -386,7 +389,8 @@ mod tests {
             (b"time,a,b\n0,1,2\n", ":1: no column of the header is called shoulder; it names time, a, b"),
             (b"shoulder,elbow\n1,2\n", ":1: no column of the header is called time"),
             (b"time,elbow,elbow,shoulder\n0,1,2,3\n", ":1: several columns are called elbow"),
-            (b"time [s],shoulder [deg],elbow [deg]\n0,1,2\n", ":1: column shoulder is in deg, not in rad or m"),
+            (b"time [s],shoulder [deg],elbow [deg]\n0,1,2\n", ":1: column shoulder is in deg, not in m"),
+            (b"time,shoulder [m],elbow [m]\n0,1,2\n", ":1: column elbow is in m, not in rad"),
             (b"time [ms],shoulder,elbow\n0,1,2\n", ":1: column time is in ms, not in s"),
             (b"time,shoulder,elbow,force\n0,1,2\n", ":2: 3 numbers"),
             (b"0,1,2\n\xff\xfe\n", ":2: not text"),

@@ -396,8 +396,7 @@ fn a_plan_goes_out_as_a_trajectory_that_rests_at_every_point() {
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sponge.toml");
     let (fine, told) = haptize(path, &["scan", scene.to_str().unwrap(), "--plan-out", "plan.csv", "--dwell", "0.5"]);
     assert!(fine, "{told}");
-    let names: Vec<String> = labels(&chain).into_iter().map(|joint| joint.name).collect();
-    let motion = haptize::device::Motion::from_csv(&path.join("plan.csv"), &names).unwrap();
+    let motion = haptize::device::Motion::from_csv(&path.join("plan.csv"), &labels(&chain)).unwrap();
     assert_eq!(motion.duration(), Trajectory::new(&plan, scene_speed(), 0.5).duration());
     let (fine, told) = haptize(path, &["scan", scene.to_str().unwrap(), "--plan-out", "plan.csv", "--dwell", "-1"]);
     assert!(!fine && told.contains("dwell"), "{told}");

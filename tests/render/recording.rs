@@ -11,7 +11,13 @@ fn a_device_that_moves_as_recorded_is_given_the_recorded_torques_bit_for_bit() {
         use std::io::Write;
         writeln!(file, "{},{},{}", tick.time, tick.device[0], tick.device[1]).unwrap();
     }
-    let mut device = Recorded::new(Motion::from_csv(file.path(), &["a".into(), "b".into()]).unwrap());
+    let mut device = Recorded::new(
+        Motion::from_csv(
+            file.path(),
+            &["a", "b"].map(|name| engine::dataset::JointLabel { name: name.into(), unit: "rad".into() }),
+        )
+        .unwrap(),
+    );
     let haptics = build(&data, &spec);
     let again = session::run(&haptics, &mut device, None, &plan(&data, 2.0)).unwrap();
     assert_eq!(again.ticks.len(), trace.ticks.len());

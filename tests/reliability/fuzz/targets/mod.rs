@@ -13,7 +13,7 @@ pub use stores::STORES;
 use super::mutate::{self, Random};
 use crate::program;
 use haptize::{
-    dataset::Dataset,
+    dataset::{Dataset, JointLabel},
     device::Motion,
     object::Object,
     proxy::Chain,
@@ -248,7 +248,7 @@ pub const MOTIONS: Target = Target {
     mutate: mutate::text,
     run: |file, input| {
         write(file, input);
-        match Motion::from_csv(file, &["a".into(), "b".into()]) {
+        match Motion::from_csv(file, &["a", "b"].map(|name| JointLabel { name: name.into(), unit: "rad".into() })) {
             Ok(motion) => {
                 let finite = [-1.0, 0.0, 0.4, 1e9].iter().all(|time| motion.at(*time).0.iter().all(|q| q.is_finite()));
                 assert!(finite, "a motion leaves the finite numbers");
