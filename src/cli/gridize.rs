@@ -147,13 +147,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let (dataset, report) = source.gridize(&options)?;
     if report.inside == 0 {
-        let left_out = match &source.import {
-            Some(import) if !import.dropped.is_empty() => {
-                let dropped: Vec<String> = import.dropped.iter().map(ToString::to_string).collect();
-                format!(" ({})", dropped.join("; "))
-            }
-            _ => String::new(),
-        };
+        let left_out =
+            source.import.as_ref().map_or(String::new(), |import| format!(" (of the rows {})", import.left_out()));
         return Err(format!(
             "none of the {} grid points lies between the {} samples{left_out}: give a smaller --step, or a log that \
              goes through more of the joints' ranges",

@@ -279,8 +279,8 @@ fn known() -> String {
     Kind::ALL.map(Kind::name).join(", ")
 }
 
-/// Opens the device at `address`, its motors off. The simulated one is the arm of a scene with such a `[device]`, held by
-/// the hand, or without a scene held at rest.
+/// Opens the device at `address`, its motors off. The simulated one is the arm of a scene with such a `[device]`, held
+/// by the hand, or without a scene held at rest.
 ///
 /// # Errors
 /// [`OpenError::Device`] says what is missing and what to do.

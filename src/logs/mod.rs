@@ -151,6 +151,17 @@ pub struct ImportReport {
     pub cells: Option<CellReport>,
 }
 
+impl ImportReport {
+    /// Says which rows were left out, and why.
+    #[must_use]
+    pub fn left_out(&self) -> String {
+        match self.dropped.as_slice() {
+            [] => "none was left out".to_owned(),
+            dropped => dropped.iter().map(Dropped::to_string).collect::<Vec<_>>().join("; "),
+        }
+    }
+}
+
 /// Data read from logs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
@@ -361,9 +372,13 @@ impl<'a> Import<'a> {
         let is_sound = |reason| matches!(reason, Reason::Absent | Reason::RepeatedTime | Reason::Outlier);
         let broken = |dropped: &&Dropped| !is_sound(dropped.reason);
         let dropped: u64 = self.report.dropped.iter().filter(broken).map(|dropped| dropped.rows).sum();
-        let listed = || self.report.dropped.iter().map(Dropped::to_string).collect::<Vec<_>>().join("; ");
         if 2 * dropped > self.report.rows {
-            return Err(ImportError::MostDropped { dropped, rows: self.report.rows, listed: listed(), remedy });
+            return Err(ImportError::MostDropped {
+                dropped,
+                rows: self.report.rows,
+                listed: self.report.left_out(),
+                remedy,
+            });
         }
         let keep = self.mapping.torque.keep;
         let mut branches = None;
@@ -379,7 +394,7 @@ impl<'a> Import<'a> {
             return Err(ImportError::Nothing(format!(
                 "{} rows were read ({}); see torque.keep, torque.still and torque.cell in the mapping",
                 self.report.rows,
-                if self.report.dropped.is_empty() { "none was left out".to_owned() } else { listed() }
+                self.report.left_out()
             )));
         }
         Ok(Imported { samples: self.samples, branches, report: self.report })

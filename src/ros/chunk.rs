@@ -1,6 +1,6 @@
 //! Records of a chunk of an MCAP file, taken out of their compression.
 
-use super::RosError;
+use super::{RECOVER, RosError};
 use std::{borrow::Cow, io::Read, path::Path};
 
 /// Longest record or chunk that is read (bytes): a chunk of a recorder's is a few MiB.
@@ -35,9 +35,7 @@ impl<'a> Chunk<'a> {
             )));
         }
         let broken = |what: &dyn std::fmt::Display| {
-            refuse(format!(
-                "a compressed chunk cannot be read ({what}): the file is damaged: what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`"
-            ))
+            refuse(format!("the file is damaged, a compressed chunk cannot be read ({what}): {RECOVER}"))
         };
         let taken = |reader: &mut dyn Read| {
             let mut records = Vec::new();
@@ -69,8 +67,8 @@ impl<'a> Chunk<'a> {
         let calculated = if self.checksum == 0 { 0 } else { crc32fast::hash(&records) };
         if calculated != self.checksum {
             return Err(refuse(format!(
-                "the checksum of a chunk is {:08x}, that of its records {calculated:08x}: the file is damaged: \
-                 what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`",
+                "the file is damaged, the checksum of a chunk is {:08x} and that of its records {calculated:08x}: \
+                 {RECOVER}",
                 self.checksum
             )));
         }

@@ -5,7 +5,7 @@
 //! than its chunk for one that is not. Memory is that of the longest record or chunk.
 
 use super::{
-    MESSAGE_ENCODING, RosError, TYPE,
+    MESSAGE_ENCODING, RECOVER, RosError, TYPE,
     chunk::{Chunk, LONGEST_RECORD},
     is_mcap,
 };
@@ -110,10 +110,7 @@ impl Messages {
 
 /// The error of a file whose records are not as long as they say.
 fn damaged(path: &Path) -> RosError {
-    let what =
-        "a record is shorter than it says: the file is damaged: what is whole comes back by `mcap recover IN.mcap -o \
-                OUT.mcap`"
-            .to_owned();
+    let what = format!("the file is damaged, a record is shorter than it says: {RECOVER}");
     RosError::Mcap { file: path.to_owned(), what }
 }
 

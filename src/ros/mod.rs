@@ -32,6 +32,9 @@ const MESSAGE_ENCODING: &str = "cdr";
 /// Topic of where the hand wants the device, in a session of haptize.
 pub const HAND_TOPIC: &str = "/hand";
 
+/// What helps where a file is damaged.
+const RECOVER: &str = "what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`";
+
 /// An MCAP file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -82,7 +85,7 @@ impl RosError {
         let what = match error {
             mcap::McapError::BadMagic => "not an MCAP file".to_owned(),
             mcap::McapError::UnexpectedEof => {
-                "it ends in the middle: what is whole comes back by `mcap recover IN.mcap -o OUT.mcap`".to_owned()
+                format!("it ends in the middle: {RECOVER}")
             }
             other => other.to_string(),
         };

@@ -202,10 +202,10 @@ impl Controls {
                 ui.label("Solve").on_hover_text("The algorithm that finds the equilibrium of each configuration");
             ComboBox::from_id_salt("algorithm")
                 .width(CHOICE_WIDTH)
-                .selected_text(algorithm_name(contact.algorithm))
+                .selected_text(contact.algorithm.name())
                 .show_ui(ui, |ui| {
                     for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Linearised] {
-                        ui.selectable_value(&mut contact.algorithm, algorithm, algorithm_name(algorithm));
+                        ui.selectable_value(&mut contact.algorithm, algorithm, algorithm.name());
                     }
                 })
                 .response
@@ -270,13 +270,5 @@ fn lacking(interpolation: Interpolation, dataset: &Dataset) -> Option<&'static s
     match interpolation {
         Interpolation::Linear => None,
         Interpolation::Potential | Interpolation::Direct => dataset.energy.is_none().then_some("energy"),
-    }
-}
-
-fn algorithm_name(algorithm: Algorithm) -> &'static str {
-    match algorithm {
-        Algorithm::Energy => "energy",
-        Algorithm::Paper => "paper",
-        Algorithm::Linearised => "linearised",
     }
 }

@@ -92,8 +92,8 @@ impl Viewer {
         }
     }
 
-    /// Shows which adapter draws, and how the loop is doing. In a narrow window what stands last is cut off, and nothing
-    /// lies on anything else; a fault stands first.
+    /// Shows which adapter draws, and how the loop is doing. In a narrow window what stands last is cut off, and
+    /// nothing lies on anything else; a fault stands first.
     fn status(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {

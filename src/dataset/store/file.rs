@@ -35,7 +35,7 @@ use crate::{
         Dataset, Error, Grid, Heading, Kind, Provenance, Surface, Target, Tensor, check_place, read::Container,
         surface_tensors, write_container,
     },
-    memory,
+    memory::{self, Shortage},
 };
 use serde::{Deserialize, Serialize};
 use std::{path::Path, sync::Arc};
@@ -50,11 +50,14 @@ struct Shape {
     order: Order,
 }
 
-/// Memory that [`Dataset::refined`] takes for the points of `grid` (bytes).
-#[must_use]
-pub fn base_memory(grid: &Grid) -> usize {
+/// Checks that there is the memory that [`Dataset::refined`] takes for the points of `grid`.
+///
+/// # Errors
+/// [`Shortage`].
+pub fn check_memory(grid: &Grid) -> Result<(), Shortage> {
     let row = grid.joints() * size_of::<f64>() + size_of::<f64>() + size_of::<f32>() + size_of::<u8>();
-    grid.points().saturating_mul(row)
+    let needed = grid.points().saturating_mul(row);
+    if needed > memory::SMALL { memory::check(needed) } else { Ok(()) }
 }
 
 impl Store {
@@ -162,7 +165,7 @@ pub(in crate::dataset) fn decode(path: &Path, file: Container) -> Result<Dataset
     let damaged = |reason| Error::Damaged { path: path.into(), reason };
     let (grid, provenance) = file.heading().map_err(damaged)?;
     // A file of some kilobytes may have a base of gigabytes.
-    memory::check(base_memory(&grid)).map_err(|shortage| Error::Memory { path: path.into(), shortage })?;
+    check_memory(&grid).map_err(|shortage| Error::Memory { path: path.into(), shortage })?;
     read(file, grid, provenance).map_err(damaged)
 }
 

@@ -32,7 +32,7 @@ pub mod space;
 mod sync;
 
 pub use block::{Block, Nodes};
-pub use file::base_memory;
+pub use file::check_memory;
 pub use space::{Place, Space, SpaceError};
 
 use crate::{JointVector, MAX_JOINTS};
