@@ -1,7 +1,7 @@
 //! How long each kernel takes on the first adapter, what it moves, and what bounds it: those of a sweep of the sphere
-//! scene, by each algorithm, and those of the object's frame update. Then what the host does beside the device, with the
-//! device itself and with a stand-in that takes no time; how fast the device is once it is busy; and whole sweeps on that
-//! adapter beside the CPU backend.
+//! scene, by each algorithm, and those of the object's frame update. Then what the host does beside the device, with
+//! the device itself and with a stand-in that takes no time; how fast the device is once it is busy; and whole sweeps
+//! on that adapter beside the CPU backend.
 //!
 //!     cargo bench --bench kernels
 //!
@@ -53,8 +53,9 @@ const COPIED: u64 = 64 << 20;
 const COPIES: usize = 16;
 
 /// Operations in f64 (1), and bytes from the cache (B), of what the search counts. A pair of nodes: a number of C times
-/// three of a force, added up. A bent facet: 400 for its control points, if it is regular, and 1,600 for the point closest
-/// to the proxy node, from a dozen nodes and their displacements. A step of an elimination: a product, subtracted.
+/// three of a force, added up. A bent facet: 400 for its control points, if it is regular, and 1,600 for the point
+/// closest to the proxy node, from a dozen nodes and their displacements. A step of an elimination: a product,
+/// subtracted.
 const PAIR: [f64; 2] = [6.0, 8.0];
 const FACET: [f64; 2] = [2_000.0, 800.0];
 const ELIMINATION: [f64; 2] = [2.0, 16.0];
@@ -68,8 +69,8 @@ const HOST_STRIDE: usize = 16;
 /// Sweeps that the host is timed for beside a device that takes no time: the least counts.
 const HOST_TURNS: usize = 7;
 
-/// Sweeps of the same configurations on one adapter: with the first ones it finds how many it takes at a time, and a GPU
-/// raises its clock.
+/// Sweeps of the same configurations on one adapter: with the first ones it finds how many it takes at a time, and a
+/// GPU raises its clock.
 const BUSY_TURNS: usize = 16;
 
 /// What is known of the adapter beforehand.

@@ -69,8 +69,8 @@ pub(crate) fn plain(name: &str) -> String {
     name.replace(|c| matches!(c, ',' | '"') || is_disruptive(c), "_")
 }
 
-/// Returns the fields of a line, trimmed of blanks and quotation marks. Between quotation marks a delimiter is a character
-/// like any other (RFC 4180). A blank as delimiter takes any run of blanks and tabs.
+/// Returns the fields of a line, trimmed of blanks and quotation marks. Between quotation marks a delimiter is a
+/// character like any other (RFC 4180). A blank as delimiter takes any run of blanks and tabs.
 pub(crate) fn fields(text: &str, delimiter: char) -> impl Iterator<Item = &str> {
     let blank = delimiter == ' ';
     let parts = move |c: char| if blank { c.is_ascii_whitespace() } else { c == delimiter };

@@ -151,8 +151,8 @@ fn a_pantograph_beyond_a_smaller_grid_is_free_or_held() {
 }
 
 /// The scene with the axes `grid`, which leave out much of what the joints' limits allow. The hand goes anywhere within
-/// the limits: the proxy enters the object nowhere that was not solved, and a hand in the object is pushed back wherever
-/// it is.
+/// the limits: the proxy enters the object nowhere that was not solved, and a hand in the object is pushed back
+/// wherever it is.
 fn beyond_a_grid(name: &str, grid: &[&str]) {
     /// Depth from which a hand must feel something (m): well beyond a cell's error of where contact begins.
     const DEEP: f64 = 0.004;

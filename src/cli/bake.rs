@@ -71,7 +71,8 @@ pub struct Arguments {
     shard: Option<ShardChoice>,
 }
 
-/// Haptizes the scene. Exit code 1 where nothing touches, unless that is allowed. Ctrl-C leaves a part that `--resume` continues.
+/// Haptizes the scene. Exit code 1 where nothing touches, unless that is allowed. Ctrl-C leaves a part that `--resume`
+/// continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut scene = Scene::load(&arguments.scene)?;
     if let Some(algorithm) = arguments.algorithm {

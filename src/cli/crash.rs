@@ -34,8 +34,8 @@ mod handler {
     pub fn let_go_first() {
         let answer = answer as extern "C" fn(libc::c_int, *mut libc::siginfo_t, *mut libc::c_void);
         for (signal, before) in SIGNALS.into_iter().zip(&BEFORE) {
-            // SAFETY: zero is valid for each number of an action, and the handler calls nothing that may not be called in
-            // one. It runs on the thread's signal stack, as it must where the other one has overflowed.
+            // SAFETY: zero is valid for each number of an action, and the handler calls nothing that may not be called
+            // in one. It runs on the thread's signal stack, as it must where the other one has overflowed.
             unsafe {
                 let mut action: libc::sigaction = std::mem::zeroed();
                 if libc::sigaction(signal, ptr::null(), &raw mut action) == 0 {

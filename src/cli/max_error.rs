@@ -55,8 +55,8 @@ pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> 
 fn state(pilot: &Pilot, choice: &Choice) {
     let best = pilot.prospects.first().map_or(0.0, |best| best.order);
     tell(format_args!(
-        "haptize: for an rms error of {:.2e} N m ({:.2} % of {:.4} N m{}): {} grid points, {:.4} apart, `{}`, solved to \
-         {:.0e}; the pilot's errors fell with the spacing to the power {best:.2}",
+        "haptize: for an rms error of {:.2e} N m ({:.2} % of {:.4} N m{}): {} grid points, {:.4} apart, `{}`, \
+         solved to {:.0e}; the pilot's errors fell with the spacing to the power {best:.2}",
         pilot.aim,
         100.0 * pilot.relative,
         pilot.torque,

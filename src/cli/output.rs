@@ -105,9 +105,8 @@ impl Earlier {
 /// Checks that a file of `kind` may be written to `output` by a command that reads `inputs`.
 ///
 /// # Errors
-/// When `output` is one of the inputs, by whatever name, is there and no regular file, may not be read or written to, holds
-/// something of another kind,
-/// or lies in a folder that cannot be written to.
+/// When `output` is one of the inputs, by whatever name, is there and no regular file, may not be read or written to,
+/// holds something of another kind, or lies in a folder that cannot be written to.
 pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a Path>) -> Result<Earlier, Failure> {
     let refused = |why: &str| format!("{}: {why}; nothing is written: name another file", output.display());
     let file = resolved(output).map_err(|error| refused(&error.to_string()))?;

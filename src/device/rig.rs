@@ -55,8 +55,8 @@ impl Rig for DeviceRig<'_> {
             let why =
                 if clamps.contains(Clamps::WARM) { "its motors are warm" } else { "it is beyond the device's limit" };
             return Err(RigError(format!(
-                "the device cannot hold {torque:.3?} (N m or N, joint by joint), {why}: what it would measure is not the contact's torque; \
-                 press less deep or lower the gains of [scan.control]"
+                "the device cannot hold {torque:.3?} (N m or N, joint by joint), {why}: what it would measure is not \
+                 the contact's torque; press less deep or lower the gains of [scan.control]"
             )));
         }
         let elapsed = (self.wait)(period);

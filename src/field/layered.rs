@@ -2,8 +2,8 @@
 //!
 //! `tau(q) = sum_c w_c tau_c` over the 2^d corners of the cell around q, tau_c = 0 at free points, shortened to the
 //! depth below the boundary (`boundary.rs`), where the contact index passes its threshold. Both the boundary and the
-//! torque beside it err with the spacing h. Component by component it is not the gradient of anything: it makes or takes
-//! energy around a loop.
+//! torque beside it err with the spacing h. Component by component it is not the gradient of anything: it makes or
+//! takes energy around a loop.
 //!
 //! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the
 //! object where the measurements do: it keeps the value that it has there.

@@ -1,12 +1,12 @@
 //! The contact torque as a function of configuration: interpolation over the dataset's grid (section 3.1).
 //!
 //! The scene chooses one of two ways ([`Interpolation`]): `linear` (`layered.rs`) interpolates the torque and holds it
-//! behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient; `direct`, which
-//! solves contact while it is felt, has `potential` wherever its solution is late. A refined dataset is interpolated by
-//! its store, in the store's own way (`refined.rs`). All are continuous and without
-//! memory. What they share is here: the cell around q, the fade outside the grid (`stencil.rs`), what is said of points
-//! that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is
-//! stored (contact, unconverged, overflowed) and 0 at free points.
+//! behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient; `direct`,
+//! which solves contact while it is felt, has `potential` wherever its solution is late. A refined dataset is
+//! interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without memory. What they
+//! share is here: the cell around q, the fade outside the grid (`stencil.rs`), what is said of points that were not
+//! computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored
+//! (contact, unconverged, overflowed) and 0 at free points.
 //!
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped
 //! file, which would end the process when somebody else truncates it.

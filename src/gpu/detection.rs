@@ -167,9 +167,9 @@ impl Detection {
         context.queue.submit([encoder.finish()])
     }
 
-    /// Waits for a submission of [`Detection::submit`] of `count` configurations, and tells the device which of them are in
-    /// contact: the deepest first. These take longest, so that none of them is left at the end; and those that are solved
-    /// together take about as long as each other.
+    /// Waits for a submission of [`Detection::submit`] of `count` configurations, and tells the device which of them
+    /// are in contact: the deepest first. These take longest, so that none of them is left at the end; and those that
+    /// are solved together take about as long as each other.
     pub fn collect(
         &self,
         context: &Context,

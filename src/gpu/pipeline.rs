@@ -60,7 +60,8 @@ impl BatchCapacity {
         Self { chunk: self.chunk.clamp(1, fit(placed)), contacts, ..self }
     }
 
-    /// Cut to the memory that workspaces may take. Each part of one takes so many bytes, and has a binding of its own (B).
+    /// Cut to the memory that workspaces may take. Each part of one takes so many bytes, and has a binding of its own
+    /// (B).
     fn for_workspaces(self, context: &Context, parts: [u64; 3]) -> Self {
         let budget = match context.adapter() {
             adapter if !adapter.hardware => SOFTWARE_WORKSPACES,

@@ -8,8 +8,9 @@
 //!
 //! *Passivity observers* (Hannaford and Ryu 2002) watch what the loop can still create, which lies outside this
 //! balance. At the object's port, [`Accounts::created`]: a torque that is held for a time step, and a torque field that
-//! is not exactly a gradient, give more than was stored. At the device's port, [`Accounts::device_port`]: the torque that is held between two ticks gives more
-//! than the hand put in ([`Accounts::hold_gain`]), which the device's own damping has to take.
+//! is not exactly a gradient, give more than was stored. At the device's port, [`Accounts::device_port`]: the torque
+//! that is held between two ticks gives more than the hand put in ([`Accounts::hold_gain`]), which the device's own
+//! damping has to take.
 //!
 //! The device's end of the coupling moves in two ways. When y jumps from y_{k-1} to y_k with the proxy at x_k, the
 //! spring takes in `Kvc ((y_{k-1} + y_k)/2 - x_k) . (y_k - y_{k-1})`; during the step it is the damper's end that

@@ -5,11 +5,11 @@ use crate::{
     JointVector,
     contact::Model,
     dataset::{Dataset, Error as DatasetError, Grid, Provenance, Surface},
-    memory::{self, Shortage},
+    memory::Shortage,
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{Interpolation, Scene, SceneError},
-    store::{Order, Space, SpaceError, Store, base_memory},
+    store::{Order, Space, SpaceError, Store, check_memory},
     sweep::{
         CpuBackend, NoEnergy, SceneObjectError,
         ahead::{Ahead, Follower, Solution, Solved, Whereabouts, follow},
@@ -129,7 +129,7 @@ impl OnDemand {
         let object = build_object(&scene)?;
         let chain = Chain::new(&scene.proxy);
         let grid = grid_of(&scene);
-        memory::check(base_memory(&grid)).map_err(OnDemandError::Memory)?;
+        check_memory(&grid).map_err(OnDemandError::Memory)?;
         let provenance = CpuBackend::provenance(&scene);
         let mut store = Store::new(Space::new(&grid, levels)?, order_of(&scene), 0);
         if file.exists() {
@@ -166,8 +166,8 @@ impl OnDemand {
         Dataset::refined(Arc::clone(&self.store), grid, surface, text, self.provenance.clone())
     }
 
-    /// Writes everything known so far to `file`, as a dataset. Nothing is made at the points of the grid: the memory that it
-    /// takes is that of what is written.
+    /// Writes everything known so far to `file`, as a dataset. Nothing is made at the points of the grid: the memory
+    /// that it takes is that of what is written.
     ///
     /// # Errors
     /// As [`Dataset::save`].

@@ -45,7 +45,8 @@ pub(super) fn add(scene: &mut Rendering, dataset: &Dataset) -> Vec<&'static str>
     made
 }
 
-/// Whether line `line` along an axis of `count` lines is neither the first nor the last one, where there are lines enough.
+/// Whether line `line` along an axis of `count` lines is neither the first nor the last one, where there are lines
+/// enough.
 fn is_inside(count: usize, line: usize) -> bool {
     let border = usize::from(count >= FEWEST_LINES);
     (border..count - border).contains(&line)

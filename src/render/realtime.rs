@@ -94,8 +94,8 @@ impl<'session> HapticLoop<'session> {
     /// A loop with its first deadline now; with `live` over contact that is solved meanwhile.
     ///
     /// # Errors
-    /// As [`Driver::new`], when the device's own thread calls at another rate than that of `haptics`, or when there is no
-    /// memory.
+    /// As [`Driver::new`], when the device's own thread calls at another rate than that of `haptics`, or when there is
+    /// no memory.
     pub fn new(
         haptics: &'session Haptics,
         device: &'session mut dyn Device,

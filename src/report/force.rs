@@ -58,8 +58,8 @@ pub struct SteadyForce {
 }
 
 impl EndForce {
-    /// Whether the torque of `chain` gives the force at its end: it has three joints, and contact nodes on its last link
-    /// alone.
+    /// Whether the torque of `chain` gives the force at its end: it has three joints, and contact nodes on its last
+    /// link alone.
     #[must_use]
     pub fn is_known(chain: &Chain) -> bool {
         let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.joints.len());

@@ -3,8 +3,8 @@
 //! device gives way while it is held, holds on where it is let go, and is measured there, so that no row contains the
 //! hand's own torque.
 //!
-//! Everything here drives a [`Rig`]: the [`simulated`] one, which touches no real object, and every log and dataset made
-//! with it says so; or a device's (`device/rig.rs`).
+//! Everything here drives a [`Rig`]: the [`simulated`] one, which touches no real object, and every log and dataset
+//! made with it says so; or a device's (`device/rig.rs`).
 
 mod control;
 mod log;

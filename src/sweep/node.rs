@@ -33,8 +33,8 @@ use crate::{
 /// deeper contact, of which more nodes touch. Smaller: w is a root of less energy, which errs more.
 const DEPTH_SHARE: f64 = 0.05;
 
-/// Least depth, and least change of the gap over a cell of the base, that counts (m): a picometre is far below any depth
-/// that a force belongs to.
+/// Least depth, and least change of the gap over a cell of the base, that counts (m): a picometre is far below any
+/// depth that a force belongs to.
 const LEAST_GAP: f64 = 1e-12;
 
 /// Farthest boundary that is looked for, in cells of the base along any axis (1): beyond, no cell of the node holds

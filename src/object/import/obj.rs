@@ -1,5 +1,5 @@
-//! Surfaces from Wavefront OBJ files: lines `v x y z` and `f a b c ..`, which a backslash at the end joins with the next
-//! one. What stands behind a `#` and all other lines are read past.
+//! Surfaces from Wavefront OBJ files: lines `v x y z` and `f a b c ..`, which a backslash at the end joins with the
+//! next one. What stands behind a `#` and all other lines are read past.
 //!
 //! A corner of a face is the number of a vertex, from 1, or counted back from the last one so far, from -1. What
 //! follows it behind a slash (texture and normal) has no meaning here.

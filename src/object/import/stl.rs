@@ -21,7 +21,7 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
     stream.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     let announced = bytes.get(HEAD - 4..HEAD).map(|count| u32::from_le_bytes([count[0], count[1], count[2], count[3]]));
     let whole = announced.map(|count| (count, HEAD + FACET * count as usize));
-    // Four characters of a text announce more than half a thousand million facets: no text is that long.
+    // Four characters of a text, read as a number, are more than half a billion facets: no text is as long as that.
     let nodes = match whole {
         Some((_, length)) if length == bytes.len() => binary(&bytes[HEAD..]),
         // A binary facet has bytes of zero, a text has none.

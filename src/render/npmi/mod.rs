@@ -1,5 +1,5 @@
-//! Non-iterative passive mechanical integration of the proxy (section 3.1; theory of \[3, 15\]), with constant inertia or
-//! with inertia that depends on the configuration.
+//! Non-iterative passive mechanical integration of the proxy (section 3.1; theory of \[3, 15\]), with constant inertia
+//! or with inertia that depends on the configuration.
 //!
 //! *Coordinates.* `M = L L^T`, and `p = L^T v` is kept from step to step: the kinetic energy is `1/2 |p|^2`. The
 //! continuous motion `M vdot + C v = f` becomes `pdot = L^-1 (f - S v)` with `S = C - L Ldot^T`, which is skew because

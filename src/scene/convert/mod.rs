@@ -110,7 +110,8 @@ fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneErro
     }
     if *value.get_ref() > MAX_UPDATES {
         let reason = format!(
-            "updates is {}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm = \"energy\"",
+            "updates is {}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm \
+             = \"energy\"",
             value.get_ref()
         );
         return Err(checker.error(value.span(), reason));
