@@ -157,6 +157,7 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
         Tick {
             time,
             inputs: Inputs { position: q, age: 0.0, elapsed: 1e-3, interval: 1e-3 },
+            in_arrears: false,
             restart: false,
             hand: q,
             device: q,

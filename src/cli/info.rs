@@ -128,7 +128,8 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
     if from.tolerance > 0.0 {
         write!(text, " to {:.0e}", from.tolerance)?;
     }
-    writeln!(text, " on {backend} ({adapter})")
+    writeln!(text, " on {backend} ({adapter})")?;
+    from.notices.iter().try_for_each(|notice| writeln!(text, "  notice       {}", escaped(notice)))
 }
 
 /// Writes how much a contact point feels the mesh, and what to do about it.

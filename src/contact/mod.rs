@@ -20,6 +20,7 @@ mod proximity;
 mod reach;
 mod solver;
 mod solvers;
+mod thin_parts;
 
 pub use backend::{Backend, CHUNKS_IN_FLIGHT, Work};
 pub(crate) use equilibrium::energy::RESIDUAL_FLOOR;
@@ -28,6 +29,7 @@ pub use model::{Model, MotionBound};
 pub use proximity::{NearestNode, Proximity};
 pub use solver::Solver;
 pub(crate) use solvers::{SHARE, Solvers};
+pub use thin_parts::PastMiddle;
 
 /// Least squared length, area or distance that is divided by [m^2, m^4]: far below any mesh of this world (edges over
 /// 1 nm) and far above the smallest normal f64, so that a quotient stays finite.

@@ -64,6 +64,12 @@ impl<'a> Proximity<'a> {
         self.detection.distances().zip(nodes).map(|(distance, node)| distance - node.radius)
     }
 
+    /// The model whose configurations are measured.
+    #[must_use]
+    pub fn model(&self) -> &'a Model<'a> {
+        self.model
+    }
+
     /// The proxy's pose at the last configuration measured.
     #[must_use]
     pub fn pose(&self) -> &Pose {

@@ -156,7 +156,8 @@ impl<'session> HapticLoop<'session> {
 
     /// Lets `wait` take its time, and then does the ticks whose deadlines have come meanwhile, one behind the other and
     /// each at its deadline's time: for a simulated hand at rest, which nobody sees tick. `wait` should not take longer
-    /// than [`Self::ARREARS`]; beyond that deadlines are left out as ever.
+    /// than [`Self::ARREARS`]; beyond that deadlines are left out as ever. Such ticks are marked
+    /// ([`Tick::in_arrears`]).
     pub fn tick_in_arrears(&mut self, wait: impl FnOnce()) {
         wait();
         let now = clock::now();
@@ -165,7 +166,8 @@ impl<'session> HapticLoop<'session> {
             if deadline > now {
                 return;
             }
-            self.tick_at(if now - deadline > Self::ARREARS { now } else { deadline }, deadline);
+            let in_arrears = now - deadline <= Self::ARREARS;
+            self.tick_at(if in_arrears { deadline } else { now }, deadline, in_arrears);
         }
     }
 
@@ -175,7 +177,7 @@ impl<'session> HapticLoop<'session> {
     fn tick_after(&mut self, spins: bool) {
         let deadline = self.deadline(self.next);
         let now = clock::wait_until(deadline, spins);
-        self.tick_at(now, deadline);
+        self.tick_at(now, deadline, false);
     }
 
     /// Does a tick now: for a thread that somebody else paces. The deadline is a period after the last tick, or now, if
@@ -184,7 +186,7 @@ impl<'session> HapticLoop<'session> {
         let now = clock::now();
         let deadline = self.last.map_or(now, |last| (last + self.period).min(now));
         self.began = deadline.saturating_sub(times(self.period, self.next));
-        self.tick_at(now, deadline);
+        self.tick_at(now, deadline, false);
     }
 
     /// Ticks against the clock, or as `scheduler` calls, while `goes_on`. Returns what the system refused or what
@@ -213,7 +215,7 @@ impl<'session> HapticLoop<'session> {
         run.err().map(|halt| format!("the device's own thread stopped: {halt}")).into_iter().collect()
     }
 
-    fn tick_at(&mut self, now: Duration, deadline: Duration) {
+    fn tick_at(&mut self, now: Duration, deadline: Duration, in_arrears: bool) {
         let begun = clock::now();
         let by = now - deadline;
         self.lateness.record(by);
@@ -239,7 +241,7 @@ impl<'session> HapticLoop<'session> {
         self.cost.record(clock::now() - begun);
         self.latest.write(latest);
         self.stopped |= tick.applied.halt.is_some_and(Halt::is_final);
-        if self.recorder.push(tick).is_err() {
+        if self.recorder.push(Tick { in_arrears, ..tick }).is_err() {
             self.unrecorded += 1;
         }
     }

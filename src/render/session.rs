@@ -160,6 +160,7 @@ impl<'session> Driver<'session> {
         let tick = Tick {
             time: self.time,
             inputs,
+            in_arrears: false,
             restart,
             hand: reading.hand,
             device: output.device,

@@ -21,6 +21,8 @@ pub struct Tick {
     pub time: f64,
     /// Input of the loop, unchanged.
     pub inputs: Inputs,
+    /// Whether the tick was done after its time, of a simulated hand at rest that nobody sees tick.
+    pub in_arrears: bool,
     /// Whether a fault was cleared before the tick.
     pub restart: bool,
     /// Where the hand wants the device; the device's own position where no hand is simulated (rad or m).
@@ -279,6 +281,7 @@ mod tests {
         Tick {
             time,
             inputs: Inputs { position: one, age: 0.0, elapsed: 1e-3, interval: 1e-3 },
+            in_arrears: false,
             restart: false,
             hand: one,
             device: one,

@@ -394,7 +394,11 @@ impl<'a> Sweep<'a> {
         if let Some(error) = self.error {
             let contacts = solved.tally.statuses.in_contact();
             match error.measure(&self.grid, table, contacts, stop) {
-                Ok(measured) => solved.provenance.error = measured,
+                Ok(Some(measured)) => {
+                    solved.provenance.error = Some(measured.error);
+                    solved.provenance.notices.extend(measured.notice);
+                }
+                Ok(None) => {}
                 Err(error) => solved.provenance.notices.push(format!("the error was not measured: {error}")),
             }
         }

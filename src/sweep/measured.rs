@@ -5,6 +5,8 @@
 //! time. Each is solved as a grid point is, from rest, and from those corners of its cell that predict a lower energy
 //! (`lowest.rs`). Errors are Euclidean norms over the joints; a prismatic joint counts with [`LEVER_ARM`].
 //!
+//! The same configurations tell whether the arm pushes through a part of the object within a cell.
+//!
 //! An interpolation is formed of the whole grid where that has at most [`WHOLE`] points, else of the grid lines around
 //! each configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
 
@@ -14,7 +16,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    contact::{Model, Solvers, Status},
+    contact::{Model, PastMiddle, Proximity, Solvers, Status},
     dataset::{Dataset, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
@@ -64,6 +66,13 @@ pub(super) struct ErrorCheck<'a> {
     pub lowest: bool,
 }
 
+/// What random configurations tell of a dataset.
+pub(super) struct Measured {
+    pub error: MeasuredError,
+    /// A sentence without its full stop, where the arm pushes through a part of the object.
+    pub notice: Option<String>,
+}
+
 /// A random configuration, and the lowest corner of its cell.
 struct Place {
     q: JointVector,
@@ -79,7 +88,7 @@ impl ErrorCheck<'_> {
         table: &Table<'_>,
         contacts: usize,
         stop: &AtomicBool,
-    ) -> Result<Option<MeasuredError>, FieldError> {
+    ) -> Result<Option<Measured>, FieldError> {
         let count = self.configurations.unwrap_or((contacts / 10).clamp(CONFIGURATIONS.start, CONFIGURATIONS.end));
         if count == 0 {
             return Ok(None);
@@ -122,14 +131,41 @@ impl ErrorCheck<'_> {
             Ok(InterpolationError::of(interpolation.name(), errors.collect()))
         });
         let squares: f64 = exact.iter().map(|(_, tau)| size(tau).powi(2)).sum();
-        Ok(Some(MeasuredError {
+        let error = MeasuredError {
             configurations: exact.len(),
             left_out: places.len() - exact.len(),
             interpolation: self.interpolation.name().to_owned(),
             lever_arm: lever_arm(grid.axes.iter().map(|axis| axis.unit.as_str())),
             torque: (squares / exact.len().max(1) as f64).sqrt(),
             errors: errors.collect::<Result<_, FieldError>>()?,
-        }))
+        };
+        Ok(Some(Measured { error, notice: self.pushed_through(grid, &places) }))
+    }
+
+    /// Returns what to tell where the arm gets past the middle of a part of the object between one of `places` and the
+    /// corners of its cell.
+    fn pushed_through(&self, grid: &Grid, places: &[Place]) -> Option<String> {
+        let passed: Vec<(PastMiddle, &Place)> = places
+            .par_iter()
+            .map_init(
+                || Proximity::new(self.model),
+                |proximity, place| {
+                    let reached = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
+                    Some((proximity.past_middle(&place.q, reached)?, place))
+                },
+            )
+            .flatten()
+            .collect();
+        let (thinnest, place) = passed.iter().min_by(|(a, _), (b, _)| a.thickness.total_cmp(&b.thickness))?;
+        Some(format!(
+            "near {} of {} random configurations in contact the arm passes the middle of a part of the object, {:.1} \
+             mm thick at its thinnest, at q = [{}]: contact is with the closest surface, so the torque changes its sign \
+             in the middle and is zero beyond the part: shorten the ranges of the joints, or make the part thicker",
+            passed.len(),
+            places.len(),
+            1e3 * thinnest.thickness,
+            place.q.iter().map(|q| format!("{q:.4}")).collect::<Vec<_>>().join(", ")
+        ))
     }
 }
 

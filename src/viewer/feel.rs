@@ -197,13 +197,6 @@ impl Feel {
         self.keeps_pace.store(keeps_pace, Ordering::Release);
     }
 
-    /// Whether a tick of the clock's was done afterwards, when nobody waited for it: its interval is then `period`, to
-    /// the nanosecond, which no other's is.
-    #[must_use]
-    pub fn was_in_arrears(&self, tick: &Tick, period: f64) -> bool {
-        self.steps.is_none() && tick.inputs.elapsed == period
-    }
-
     /// Lets the loop start again after a fault.
     pub fn clear_fault(&self) {
         if let Some(clear) = &self.clear {
@@ -416,10 +409,9 @@ mod tests {
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
         let loaded = Loaded::new(baked(&scene).unwrap().0, None, None).unwrap();
         let haptics = Arc::clone(&loaded.setup.haptics);
-        let period = haptics.period();
         let guide = Guide::new(&loaded);
         let mut feel = Feel::start(haptics, &scene.haptics, guide, TickSource::Clock, None, None).unwrap();
-        let rests = |feel: &Feel, tick: &Tick| feel.was_in_arrears(tick, period);
+        let rests = |_: &Feel, tick: &Tick| tick.in_arrears;
         let mut ticks = until(&mut feel, rests);
         let at_rest = *ticks.last().unwrap();
         let mut goal = at_rest.hand;

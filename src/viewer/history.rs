@@ -73,9 +73,7 @@ impl History {
     fn take(&mut self, feel: &mut Feel, jitter: fn(&mut Self) -> &mut Durations) {
         while let Some(tick) = feel.next_tick() {
             let tick = Tick { time: self.begun + tick.time, ..tick };
-            if let (false, false, Some(last)) =
-                (std::mem::take(&mut self.new), feel.was_in_arrears(&tick, self.period), self.ticks.back())
-            {
+            if let (false, false, Some(last)) = (std::mem::take(&mut self.new), tick.in_arrears, self.ticks.back()) {
                 let late = (tick.time - last.time - self.period).abs();
                 jitter(self).record(Duration::from_secs_f64(late));
             }

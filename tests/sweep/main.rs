@@ -15,3 +15,4 @@ mod reach;
 mod results;
 mod resume;
 mod shards;
+mod thin_parts;
