@@ -7,7 +7,11 @@ use super::{Model, Proximity};
 use crate::JointVector;
 use glam::DVec3;
 
-/// A contact node that gets past the middle of a part of the object.
+/// How near a contact node comes to the middle when it gets there, over the thickness (1): coordinates that are a
+/// thousand times as large as a thickness are rounded by some 1e-12 of it, and a grid point may lie on the middle.
+const ROUNDING: f64 = 1e-9;
+
+/// A contact node that gets to the middle of a part of the object, or past it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PastMiddle {
     /// Number of the node.
@@ -17,7 +21,7 @@ pub struct PastMiddle {
 }
 
 impl Proximity<'_> {
-    /// Returns the contact node that gets past the middle of the thinnest part while the arm moves from `q` to one of
+    /// Returns the contact node that gets to the middle of the thinnest part, or past it, while the arm moves from `q` to one of
     /// the configurations `reached`. Contact nodes whose middles are outside the object at `q` are left out.
     pub fn past_middle(&mut self, q: &[f64], reached: impl IntoIterator<Item = JointVector>) -> Option<PastMiddle> {
         self.gap(q);
@@ -38,12 +42,17 @@ impl Proximity<'_> {
                 parts.push((PastMiddle { node, thickness: x.distance(foot) + beyond }, foot, inwards));
             }
         }
+        if parts.is_empty() {
+            return None;
+        }
         let mut passed: Option<PastMiddle> = None;
-        for q in reached.into_iter().take(if parts.is_empty() { 0 } else { usize::MAX }) {
+        for q in reached {
             self.place(&q);
             for (part, foot, inwards) in &parts {
                 let depth = (self.pose().nodes[part.node] - surface.centre - foot).dot(*inwards);
-                if 2.0 * depth > part.thickness && passed.is_none_or(|other| part.thickness < other.thickness) {
+                if 2.0 * depth >= part.thickness * (1.0 - ROUNDING)
+                    && passed.is_none_or(|other| part.thickness < other.thickness)
+                {
                     passed = Some(*part);
                 }
             }
@@ -108,13 +117,16 @@ mod tests {
             let [depth, reached] = [(0.01, 0.99), (0.01, 6.0)].map(|(least, most)| half * random.between(least, most));
             let place = |[x, y]: [f64; 2], depth: f64| DVec3::new(x, y, side * (half - depth));
             let passed = passed(&plate, place(from, depth), &[place(from, 0.0), place(to, reached)]);
-            assert_eq!(passed.is_some(), reached > half, "{depth} to {reached} m");
+            assert_eq!(passed.is_some(), reached >= half, "{depth} to {reached} m");
             if let Some(part) = passed {
                 assert!((part.thickness - SIDES[2]).abs() < 1e-12, "{part:?}");
                 through += 1;
             }
         }
         assert!((100..200).contains(&through), "{through}");
+        // A grid may have a point on the middle.
+        let at = |z: f64| DVec3::new(0.001, 0.002, z);
+        assert!(passed(&plate, at(-0.0003), &[at(0.0)]).is_some());
     }
 
     #[test]
