@@ -100,6 +100,8 @@ impl Viewer {
                 self.progress_or_punctuality(ui);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     ui.style_mut().wrap_mode = Some(TextWrapMode::Truncate);
+                    // What finds no room ends before the words on the right.
+                    ui.set_clip_rect(ui.max_rect().intersect(ui.clip_rect()));
                     if let Some(session) = &mut self.session {
                         faults(ui, session);
                     }
