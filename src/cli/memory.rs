@@ -7,21 +7,20 @@
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
-    cell::Cell,
+    sync::atomic::{AtomicUsize, Ordering},
 };
 
 /// The system's allocator, which remembers the size of an allocation that failed.
 pub struct Remembering;
 
-thread_local! {
-    /// Size of this thread's last allocation if it failed, else 0 (bytes). A failure that the program has answered is
-    /// forgotten with the next allocation, and an `abort` for another reason is then not taken for a shortage.
-    static FAILED: Cell<usize> = const { Cell::new(0) };
-}
+/// Size of the last allocation that failed (bytes); 0 before any did.
+static FAILED: AtomicUsize = AtomicUsize::new(0);
 
 impl Remembering {
     fn checked(pointer: *mut u8, bytes: usize) -> *mut u8 {
-        FAILED.set(if pointer.is_null() { bytes } else { 0 });
+        if pointer.is_null() {
+            FAILED.store(bytes, Ordering::Relaxed);
+        }
         pointer
     }
 }
@@ -44,13 +43,10 @@ unsafe impl GlobalAlloc for Remembering {
 
 #[cfg(unix)]
 mod answer {
-    use super::FAILED;
+    use super::{FAILED, Ordering};
     use crate::device::serial;
     use rustix::stdio::{stderr, stdout};
-    use std::{
-        os::fd::BorrowedFd,
-        sync::atomic::{AtomicBool, Ordering},
-    };
+    use std::{os::fd::BorrowedFd, sync::atomic::AtomicBool};
 
     /// Whether a thread has begun to answer: of several that find no memory at once only one speaks.
     static ANSWERED: AtomicBool = AtomicBool::new(false);
@@ -87,8 +83,7 @@ mod answer {
     /// Answers `abort` for want of memory. Any other one takes its course. Zero torque goes out before.
     extern "C" fn answer<const JSON: bool>(signal: libc::c_int) {
         serial::let_go();
-        // `abort` raises its signal in the thread that calls it.
-        let failed = FAILED.get();
+        let failed = FAILED.load(Ordering::Relaxed);
         if failed == 0 && !PANICKED.load(Ordering::Relaxed) && !is_exhausted() {
             // SAFETY: no memory is involved; the signal ends the process as this returns, whoever raised it.
             unsafe {
