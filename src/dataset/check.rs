@@ -3,37 +3,26 @@
 //! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
 
-use super::{CONTACTS, Column, Contacts, Dataset, Solid, Surface, TOUCHES};
-use crate::{JointMatrix, contact::Status};
+use super::{CONTACTS, Contacts, Dataset, Grid, Solid, Stored, Surface, TOUCHES};
+use crate::contact::Status;
+use safetensors::Dtype;
+
+const TOO_MANY_POINTS: &str = "the grid has too many points";
 
 /// `Err` says what is wrong.
 pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
     let points = dataset.grid.check()?;
-    let torques = points.checked_mul(dataset.grid.joints()).ok_or("the grid has too many points")?;
-    length("torque", &dataset.torque, torques)?;
-    length("status", &dataset.status, points)?;
+    for (array, bytes) in Stored::ALL.into_iter().filter_map(|array| Some((array, dataset.stored(array)?))) {
+        length(array, bytes, &dataset.grid)?;
+        match array.description().dtype {
+            Dtype::F64 => finite(array, bytemuck::cast_slice(bytes), |x: &f64| x.is_finite())?,
+            Dtype::F32 => finite(array, bytemuck::cast_slice(bytes), |x: &f32| x.is_finite())?,
+            _ => (),
+        }
+    }
     if let Some(point) = dataset.status.iter().position(|&number| Status::from_number(number).is_none()) {
         let number = dataset.status[point];
         return Err(format!("status {number} of point {point} is unknown to this version; bake the scene again"));
-    }
-    finite("torque", &dataset.torque, |x: &f64| x.is_finite())?;
-    if let Some(energy) = &dataset.energy {
-        length("energy", energy, points)?;
-        finite("energy", energy, |x: &f64| x.is_finite())?;
-    }
-    if let Some(tangent) = &dataset.tangent {
-        let entries = points.checked_mul(JointMatrix::entries(dataset.grid.joints()));
-        length("tangent", tangent, entries.ok_or("the grid has too many points")?)?;
-        finite("tangent", tangent, |x: &f32| x.is_finite())?;
-    }
-    for (name, column) in [("gap", &dataset.gap), ("residual", &dataset.residual)] {
-        if let Some(column) = column {
-            length(name, column, points)?;
-            finite(name, column, |x: &f32| x.is_finite())?;
-        }
-    }
-    if let Some(iterations) = &dataset.iterations {
-        length("iterations", iterations, points)?;
     }
     if let Some(surface) = &dataset.surface {
         check_surface(surface)?;
@@ -52,57 +41,62 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
 
 fn check_surface(surface: &Surface) -> Result<(), String> {
     let Surface { nodes, triangles, solid } = surface;
-    if !nodes.len().is_multiple_of(3) || !triangles.len().is_multiple_of(3) {
-        return Err("the surface has an incomplete node or triangle".into());
-    }
-    finite("surface_nodes", nodes, |x: &f64| x.is_finite())?;
-    within("surface_triangles", triangles, nodes.len() / 3)?;
+    within(Stored::SurfaceTriangles, triangles, nodes.len() / 3)?;
     let Some(Solid { inner_nodes, tetrahedra, regions }) = solid else { return Ok(()) };
-    if !inner_nodes.len().is_multiple_of(3) || !tetrahedra.len().is_multiple_of(4) {
-        return Err("the solid has an incomplete node or tetrahedron".into());
-    }
     if !regions.is_empty() && regions.len() != tetrahedra.len() / 4 {
         return Err(format!("the solid has {} tetrahedra, but regions of {}", tetrahedra.len() / 4, regions.len()));
     }
-    finite("inner_nodes", inner_nodes, |x: &f64| x.is_finite())?;
-    within("tetrahedra", tetrahedra, (nodes.len() + inner_nodes.len()) / 3)
+    within(Stored::Tetrahedra, tetrahedra, (nodes.len() + inner_nodes.len()) / 3)
 }
 
-fn check_contacts(contacts: &Contacts, points: usize, names: [&str; 3]) -> Result<(), String> {
+fn check_contacts(contacts: &Contacts, points: usize, [ends, at, on]: [Stored; 3]) -> Result<(), String> {
     let Contacts { offsets, nodes, forces } = contacts;
-    length(names[0], offsets, points.checked_add(1).ok_or("the grid has too many points")?)?;
-    length(names[2], forces, nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
+    exactly(ends, offsets.len(), points.checked_add(1).ok_or(TOO_MANY_POINTS)?)?;
+    exactly(on, forces.len(), nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
+    let (ends, at) = (ends.name(), at.name());
     if offsets[0] != 0 || offsets[points] != nodes.len() as u64 {
-        return Err(format!("{} do not run from 0 to the {} contacts", names[0], nodes.len()));
+        return Err(format!("{ends} do not run from 0 to the {} contacts", nodes.len()));
     }
     if let Some(point) = offsets.windows(2).position(|pair| pair[0] > pair[1]) {
-        return Err(format!("{} descend at point {point}", names[0]));
+        return Err(format!("{ends} descend at point {point}"));
     }
     // Ascending offsets that end at nodes.len() are all within.
     let row = |point: usize| &nodes[offsets[point] as usize..offsets[point + 1] as usize];
-    if let Some(point) = (0..points).find(|&point| row(point).windows(2).any(|pair| pair[0] >= pair[1])) {
-        return Err(format!("{} of point {point} do not ascend", names[1]));
+    match (0..points).find(|&point| row(point).windows(2).any(|pair| pair[0] >= pair[1])) {
+        Some(point) => Err(format!("{at} of point {point} do not ascend")),
+        None => Ok(()),
     }
-    finite(names[2], forces, |x: &f32| x.is_finite())
 }
 
-fn length<T: bytemuck::Pod>(name: &str, column: &Column<T>, expected: usize) -> Result<(), String> {
-    match column.len() {
+/// Whether an array of these bytes has the numbers that `grid` asks for or, where its first axis is free, whole rows.
+fn length(array: Stored, bytes: &[u8], grid: &Grid) -> Result<(), String> {
+    let lengths = array.shape(grid);
+    let given = lengths.iter().flatten().try_fold(1, |product: usize, &length| product.checked_mul(length));
+    let (given, found) = (given.ok_or(TOO_MANY_POINTS)?, 8 * bytes.len() / array.description().dtype.bitsize());
+    if lengths.contains(&None) {
+        let is_whole = found.is_multiple_of(given);
+        return is_whole.then_some(()).ok_or_else(|| format!("the last row of {} is incomplete", array.name()));
+    }
+    exactly(array, found, given)
+}
+
+fn exactly(array: Stored, found: usize, expected: usize) -> Result<(), String> {
+    match found {
         found if found == expected => Ok(()),
-        found => Err(format!("{name} has {found} entries where the grid asks for {expected}")),
+        found => Err(format!("{} has {found} entries where the grid asks for {expected}", array.name())),
     }
 }
 
-fn finite<T>(name: &str, column: &[T], is_finite: impl Fn(&T) -> bool) -> Result<(), String> {
-    match column.iter().position(|x| !is_finite(x)) {
+fn finite<T>(array: Stored, numbers: &[T], is_finite: impl Fn(&T) -> bool) -> Result<(), String> {
+    match numbers.iter().position(|x| !is_finite(x)) {
         None => Ok(()),
-        Some(entry) => Err(format!("entry {entry} of {name} is not a finite number")),
+        Some(entry) => Err(format!("entry {entry} of {} is not a finite number", array.name())),
     }
 }
 
-fn within(name: &str, column: &[u32], nodes: usize) -> Result<(), String> {
-    match column.iter().position(|&node| node as usize >= nodes) {
+fn within(array: Stored, numbers: &[u32], nodes: usize) -> Result<(), String> {
+    match numbers.iter().position(|&node| node as usize >= nodes) {
         None => Ok(()),
-        Some(entry) => Err(format!("entry {entry} of {name} is node {}, of {nodes}", column[entry])),
+        Some(entry) => Err(format!("entry {entry} of {} is node {}, of {nodes}", array.name(), numbers[entry])),
     }
 }

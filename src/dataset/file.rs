@@ -8,20 +8,7 @@
 //! the rest  tensors, little-endian, widest type first
 //! ```
 //!
-//! | tensor | type | shape | |
-//! |---|---|---|---|
-//! | `torque` | f64 | n1 .. nd, d | tau (N m; N at prismatic joints) |
-//! | `energy` | f64 | n1 .. nd | U (J) |
-//! | `tangent` | f32 | n1 .. nd, d (d + 1) / 2 | d tau/d q, lower triangle, where the interpolation uses it (N m/rad) |
-//! | `gap` | f32 | n1 .. nd | smallest signed distance at rest; a positive lower bound far from contact (m) |
-//! | `residual`, `iterations` | f32, u32 | n1 .. nd | of the contact solver |
-//! | `status` | u8 | n1 .. nd | [`crate::contact::Status`] |
-//! | `contact_offsets` | u64 | points + 1 | rows of the next two |
-//! | `contact_nodes`, `contact_forces` | u32, f32 | c and c, 3 | object node, force on it (N) |
-//! | `touch_offsets`, `touch_nodes`, `touch_forces` | u64, u32, f32 | as these | on nodes of the proxy, where needed |
-//! | `surface_nodes`, `surface_triangles` | f64, u32 | S, 3 and T, 3 | at rest (m) |
-//! | `inner_nodes`, `tetrahedra` | f64, u32 | I, 3 and V, 4 | of tetrahedra; inner nodes count from S on (m) |
-//! | `regions` | u32 | V | physical volume of each tetrahedron, where the mesh names any |
+//! `stored.rs` says which tensors there are.
 //!
 //! In Python: `safetensors.numpy.load_file("sphere.haptize")["torque"]`.
 //!
@@ -33,10 +20,8 @@
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
 use super::{
-    BUFFER, CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, TOUCHES, Target, check,
-    replace_file, store,
+    BUFFER, Dataset, Error, Grid, Provenance, Stored, Surface, Target, check, replace_file, store, stored::Description,
 };
-use crate::JointMatrix;
 use bytemuck::Pod;
 use rayon::prelude::*;
 use safetensors::{Dtype, tensor::TensorInfo};
@@ -141,6 +126,15 @@ impl<C> Tensor<C> {
         Self { name, dtype: T::DTYPE, shape, contents }
     }
 
+    /// An array of a dataset over `grid`, of so many bytes.
+    pub(crate) fn stored(array: Stored, grid: &Grid, bytes: usize, contents: C) -> Self {
+        let Description { name, dtype, .. } = *array.description();
+        let lengths = array.shape(grid);
+        let given: usize = lengths.iter().flatten().product();
+        let free = 8 * bytes / (dtype.bitsize() * given).max(1);
+        Self { name, dtype, shape: lengths.into_iter().map(|length| length.unwrap_or(free)).collect(), contents }
+    }
+
     /// The same tensor, its contents handed over in another form.
     pub(crate) fn map<D>(self, convert: impl FnOnce(C) -> D) -> Tensor<D> {
         let Self { name, dtype, shape, contents } = self;
@@ -152,52 +146,23 @@ impl<C> Tensor<C> {
     }
 }
 
-fn tensor<'a, T: Element>(name: &'static str, shape: &[usize], column: &'a Column<T>) -> Tensor<&'a [u8]> {
-    Tensor::new::<T>(name, shape.to_vec(), bytemuck::cast_slice(column))
+/// The arrays that a dataset has.
+pub(super) fn arrays(dataset: &Dataset) -> impl Iterator<Item = (Stored, Tensor<&[u8]>)> {
+    Stored::ALL.into_iter().filter_map(|array| {
+        let bytes = dataset.stored(array)?;
+        Some((array, Tensor::stored(array, &dataset.grid, bytes.len(), bytes)))
+    })
 }
 
-/// All tensors of a dataset.
-pub(super) fn tensors(dataset: &Dataset) -> Vec<Tensor<&[u8]>> {
-    let grid = dataset.grid.counts();
-    let torque_shape = [&grid[..], &[dataset.grid.joints()]].concat();
-    let mut tensors = vec![tensor("torque", &torque_shape, &dataset.torque), tensor("status", &grid, &dataset.status)];
-    tensors.extend(dataset.energy.as_ref().map(|column| tensor("energy", &grid, column)));
-    let tangent_shape = [&grid[..], &[JointMatrix::entries(dataset.grid.joints())]].concat();
-    tensors.extend(dataset.tangent.as_ref().map(|column| tensor("tangent", &tangent_shape, column)));
-    tensors.extend(dataset.gap.as_ref().map(|column| tensor("gap", &grid, column)));
-    tensors.extend(dataset.residual.as_ref().map(|column| tensor("residual", &grid, column)));
-    tensors.extend(dataset.iterations.as_ref().map(|column| tensor("iterations", &grid, column)));
-    for (names, contacts) in [(CONTACTS, &dataset.contacts), (TOUCHES, &dataset.touches)] {
-        if let Some(Contacts { offsets, nodes, forces }) = contacts {
-            tensors.push(tensor(names[0], &[offsets.len()], offsets));
-            tensors.push(tensor(names[1], &[nodes.len()], nodes));
-            tensors.push(tensor(names[2], &[nodes.len(), 3], forces));
-        }
-    }
-    tensors.extend(dataset.surface.iter().flat_map(surface_tensors));
-    tensors
-}
-
-/// The tensors of an object's geometry.
-pub(crate) fn surface_tensors(surface: &Surface) -> Vec<Tensor<&[u8]>> {
-    let Surface { nodes, triangles, solid } = surface;
-    let mut tensors = vec![
-        tensor("surface_nodes", &[nodes.len() / 3, 3], nodes),
-        tensor("surface_triangles", &[triangles.len() / 3, 3], triangles),
-    ];
-    if let Some(Solid { inner_nodes, tetrahedra, regions }) = solid {
-        tensors.push(tensor("inner_nodes", &[inner_nodes.len() / 3, 3], inner_nodes));
-        tensors.push(tensor("tetrahedra", &[tetrahedra.len() / 4, 4], tetrahedra));
-        if !regions.is_empty() {
-            tensors.push(tensor("regions", &[regions.len()], regions));
-        }
-    }
-    tensors
+/// The tensors of an object's geometry, in a file of a dataset over `grid`.
+pub(crate) fn surface_tensors<'a>(grid: &Grid, surface: &'a Surface) -> Vec<Tensor<&'a [u8]>> {
+    let tensor = |array| surface.stored(array).map(|bytes| Tensor::stored(array, grid, bytes.len(), bytes));
+    Stored::ALL.into_iter().filter_map(tensor).collect()
 }
 
 /// Memory of all columns (bytes).
 pub(super) fn bytes(dataset: &Dataset) -> usize {
-    tensors(dataset).iter().map(Tensor::bytes).sum()
+    arrays(dataset).map(|(_, tensor)| tensor.bytes()).sum()
 }
 
 /// Whether a file that begins with `start` may be a dataset: it begins with the length of its header, a JSON object.
@@ -237,7 +202,7 @@ impl Dataset {
         if let Some(store) = &self.refinement {
             return store::file::save(store, heading, self.surface.as_ref(), target);
         }
-        write_file(target, heading, tensors(self))
+        write_file(target, heading, arrays(self).map(|(_, tensor)| tensor).collect())
     }
 }
 
@@ -258,8 +223,7 @@ pub(crate) struct Kind<'a> {
     pub(crate) store: Option<&'a str>,
 }
 
-/// Writes a dataset's file, replacing the one that is `target` whole or not at all. The tensors are as in the table
-/// above, in any order.
+/// Writes a dataset's file, replacing the one that is `target` whole or not at all. The tensors may be in any order.
 pub(crate) fn write_file<C: Contents>(
     target: Target<'_>,
     heading: Heading<'_>,

@@ -18,6 +18,7 @@ mod grid;
 mod known;
 mod read;
 pub mod store;
+mod stored;
 mod summary;
 mod surface;
 
@@ -33,6 +34,7 @@ pub(crate) use file::{
     write_container, write_file,
 };
 pub use grid::{Axis, Grid, JointLabel};
+pub(crate) use stored::{Axes, CONTACTS, Stored, TOUCHES};
 pub use summary::{Refinement, StatusCounts, Summary};
 
 use crate::contact::{MeshRipple, NodeForce, Status};
@@ -84,11 +86,6 @@ pub struct Contacts {
     /// Three numbers a contact (N).
     pub forces: Column<f32>,
 }
-
-/// Tensors of the contact forces on the object.
-pub(crate) const CONTACTS: [&str; 3] = ["contact_offsets", "contact_nodes", "contact_forces"];
-/// Tensors of those on the proxy.
-pub(crate) const TOUCHES: [&str; 3] = ["touch_offsets", "touch_nodes", "touch_forces"];
 
 /// The object's geometry at rest: its surface, and what is inside where the scene's mesh is one of tetrahedra.
 #[derive(Clone)]

@@ -1,12 +1,12 @@
 //! Dataset files, read: mapped or copied, checked as a whole, and cut into columns where they lie.
 
 use super::{
-    CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Surface, TOUCHES, check,
+    CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Stored, Surface, TOUCHES, check,
     file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
     store,
 };
 use crate::{
-    JointMatrix, input,
+    input,
     memory::{self, Shortage},
 };
 use memmap2::{Mmap, MmapMut};
@@ -154,8 +154,8 @@ impl Container {
     }
 
     /// Takes the object's geometry; `None` where it is absent. `Err` says what is wrong.
-    pub(super) fn surface(&mut self) -> Result<Option<Surface>, String> {
-        self.windows.surface(&mut self.tensors)
+    pub(super) fn surface(&mut self, grid: &Grid) -> Result<Option<Surface>, String> {
+        Arrays { windows: &self.windows, tensors: &mut self.tensors, grid }.surface()
     }
 
     /// `Err` names a tensor that has not been taken.
@@ -180,56 +180,23 @@ impl Windows {
         scene: String,
         provenance: Provenance,
     ) -> Result<Dataset, String> {
-        let counts: Vec<_> = grid.counts().into_iter().map(Some).collect();
-        let with_joints: Vec<_> = counts.iter().copied().chain([Some(grid.joints())]).collect();
-        let with_tangent: Vec<_> = counts.iter().copied().chain([Some(JointMatrix::entries(grid.joints()))]).collect();
+        let mut file = Arrays { windows: self, tensors, grid: &grid };
         Ok(Dataset {
-            torque: self.column(tensors, "torque", &with_joints)?.ok_or_else(|| missing("torque"))?,
-            status: self.column(tensors, "status", &counts)?.ok_or_else(|| missing("status"))?,
-            energy: self.column(tensors, "energy", &counts)?,
-            tangent: self.column(tensors, "tangent", &with_tangent)?,
-            gap: self.column(tensors, "gap", &counts)?,
-            residual: self.column(tensors, "residual", &counts)?,
-            iterations: self.column(tensors, "iterations", &counts)?,
-            contacts: self.contacts(tensors, CONTACTS)?,
-            touches: self.contacts(tensors, TOUCHES)?,
-            surface: self.surface(tensors)?,
+            torque: file.required(Stored::Torque)?,
+            energy: file.optional(Stored::Energy)?,
+            tangent: file.optional(Stored::Tangent)?,
+            gap: file.optional(Stored::Gap)?,
+            status: file.required(Stored::Status)?,
+            residual: file.optional(Stored::Residual)?,
+            iterations: file.optional(Stored::Iterations)?,
+            contacts: file.contacts(CONTACTS)?,
+            touches: file.contacts(TOUCHES)?,
+            surface: file.surface()?,
             refinement: None,
             grid,
             scene,
             provenance,
         })
-    }
-
-    /// Takes the object's geometry out of `tensors`; `None` where it is absent.
-    fn surface(&self, tensors: &mut BTreeMap<String, TensorInfo>) -> Result<Option<Surface>, String> {
-        let Some(nodes) = self.column(tensors, "surface_nodes", &[None, Some(3)])? else { return Ok(None) };
-        let triangles = self.column(tensors, "surface_triangles", &[None, Some(3)])?;
-        let solid = match self.column(tensors, "tetrahedra", &[None, Some(4)])? {
-            None => None,
-            Some(tetrahedra) => Some(Solid {
-                inner_nodes: self
-                    .column(tensors, "inner_nodes", &[None, Some(3)])?
-                    .ok_or_else(|| missing("inner_nodes"))?,
-                tetrahedra,
-                regions: self.column(tensors, "regions", &[None])?.unwrap_or_else(|| Vec::new().into()),
-            }),
-        };
-        Ok(Some(Surface { nodes, triangles: triangles.ok_or_else(|| missing("surface_triangles"))?, solid }))
-    }
-
-    /// Takes contact forces out of `tensors`; `None` where they are absent.
-    fn contacts(
-        &self,
-        tensors: &mut BTreeMap<String, TensorInfo>,
-        [offsets, nodes, forces]: [&str; 3],
-    ) -> Result<Option<Contacts>, String> {
-        let Some(offsets) = self.column(tensors, offsets, &[None])? else { return Ok(None) };
-        Ok(Some(Contacts {
-            offsets,
-            nodes: self.column(tensors, nodes, &[None])?.ok_or_else(|| missing(nodes))?,
-            forces: self.column(tensors, forces, &[None, Some(3)])?.ok_or_else(|| missing(forces))?,
-        }))
     }
 
     /// Takes the tensor `name` out of `tensors`; `None` where it is absent. `shape` leaves free lengths as `None`.
@@ -249,6 +216,45 @@ impl Windows {
         Column::mapped(self.map.clone(), self.start + start..self.start + end)
             .map(Some)
             .ok_or_else(|| format!("tensor {name} lies outside the file or is misaligned"))
+    }
+}
+
+/// The arrays of a file of a dataset over a grid, of which each is taken once.
+struct Arrays<'a> {
+    windows: &'a Windows,
+    tensors: &'a mut BTreeMap<String, TensorInfo>,
+    grid: &'a Grid,
+}
+
+impl Arrays<'_> {
+    /// `None` where it is absent.
+    fn optional<T: Element>(&mut self, array: Stored) -> Result<Option<Column<T>>, String> {
+        self.windows.column(self.tensors, array.name(), &array.shape(self.grid))
+    }
+
+    fn required<T: Element>(&mut self, array: Stored) -> Result<Column<T>, String> {
+        self.optional(array)?.ok_or_else(|| missing(array.name()))
+    }
+
+    /// The object's geometry; `None` where it is absent.
+    fn surface(&mut self) -> Result<Option<Surface>, String> {
+        let Some(nodes) = self.optional(Stored::SurfaceNodes)? else { return Ok(None) };
+        let triangles = self.required(Stored::SurfaceTriangles)?;
+        let solid = match self.optional(Stored::Tetrahedra)? {
+            None => None,
+            Some(tetrahedra) => Some(Solid {
+                inner_nodes: self.required(Stored::InnerNodes)?,
+                tetrahedra,
+                regions: self.optional(Stored::Regions)?.unwrap_or_else(|| Vec::new().into()),
+            }),
+        };
+        Ok(Some(Surface { nodes, triangles, solid }))
+    }
+
+    /// Contact forces; `None` where they are absent.
+    fn contacts(&mut self, [offsets, nodes, forces]: [Stored; 3]) -> Result<Option<Contacts>, String> {
+        let Some(offsets) = self.optional(offsets)? else { return Ok(None) };
+        Ok(Some(Contacts { offsets, nodes: self.required(nodes)?, forces: self.required(forces)? }))
     }
 }
 

@@ -144,22 +144,6 @@ impl Dataset {
         }
     }
 
-    /// Returns the quantities that the dataset does not hold, in words. A measured one holds none of these: a device
-    /// feels torque alone.
-    #[must_use]
-    pub fn absent(&self) -> Vec<&'static str> {
-        [
-            (self.energy.is_none(), "stored energy"),
-            (self.gap.is_none(), "gap"),
-            (self.residual.is_none(), "residuals"),
-            (self.contacts.is_none(), "contact forces"),
-            (self.surface.is_none(), "the object's surface"),
-        ]
-        .into_iter()
-        .filter_map(|(absent, name)| absent.then_some(name))
-        .collect()
-    }
-
     /// Greatest residual of a converged point in contact (1); `None` where residuals are not stored.
     #[must_use]
     pub fn max_residual(&self) -> Option<f64> {

@@ -2,12 +2,10 @@
 //! Memory does not grow with the grid.
 
 use super::{
-    columns::{Section, Shape},
+    columns::Shape,
     table::{Block, Table},
 };
-use crate::dataset::{
-    self, CONTACTS, Heading, Surface, TOUCHES, Target, Tensor, TensorContents, surface_tensors, write_file,
-};
+use crate::dataset::{self, Heading, Stored, Surface, Target, Tensor, TensorContents, surface_tensors, write_file};
 use rayon::prelude::*;
 use std::{
     io::{self, Write},
@@ -21,6 +19,10 @@ const PIECE: usize = 1 << 12;
 /// Memory that it takes: the buffers before the file (bytes).
 pub(super) fn buffers() -> usize {
     dataset::BUFFER + rayon::current_num_threads() * dataset::PIECE_BUFFER
+}
+
+fn is_ends(array: Stored) -> bool {
+    [Stored::ContactOffsets, Stored::TouchOffsets].contains(&array)
 }
 
 /// The results of a sweep.
@@ -38,12 +40,12 @@ impl<'a> Results<'a> {
     /// The results of all `points` points in `table`, as they go into a file of `shape`.
     pub fn new(table: &'a Table<'a>, points: usize, shape: Shape, stop: &'a AtomicBool) -> Self {
         let mut results = Self { table, points, shape, rows: Default::default(), stop };
-        results.rows = [(shape.with_forces, Section::Ends), (shape.with_touches, Section::TouchEnds)]
-            .map(|(stored, ends)| if stored { results.rows_before(ends) } else { Vec::new() });
+        results.rows = [Stored::ContactOffsets, Stored::TouchOffsets]
+            .map(|ends| if shape.has(ends) { results.rows_before(ends) } else { Vec::new() });
         results
     }
 
-    fn rows_before(&self, ends: Section) -> Vec<usize> {
+    fn rows_before(&self, ends: Stored) -> Vec<usize> {
         let rows = |piece| self.runs(piece).map(|(block, points)| block.rows(ends, points).len()).sum();
         let counts: Vec<usize> = (0..self.points.div_ceil(PIECE)).into_par_iter().map(rows).collect();
         let mut before = vec![0];
@@ -59,43 +61,27 @@ impl<'a> Results<'a> {
     }
 
     /// Bytes of an entry of a column.
-    fn size(&self, section: Section) -> usize {
-        self.shape.width().entries()[section as usize]
+    fn size(&self, array: Stored) -> usize {
+        self.shape.width().bytes(array)
     }
 
     /// Contacts before each piece, or touches, whose ends are `ends`.
-    fn before(&self, ends: Section) -> &[usize] {
-        &self.rows[usize::from(ends == Section::TouchEnds)]
+    fn before(&self, ends: Stored) -> &[usize] {
+        &self.rows[usize::from(ends == Stored::TouchOffsets)]
     }
 
     /// Writes all points as the dataset `output`.
     pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), dataset::Error> {
-        let of = |section| Contents::Section(self, section);
-        let grid = heading.grid.counts();
-        let mut tensors = vec![
-            Tensor::new::<f64>("torque", [&grid[..], &[self.shape.joints]].concat(), of(Section::Torque)),
-            Tensor::new::<u8>("status", grid.clone(), of(Section::Status)),
-            Tensor::new::<f64>("energy", grid.clone(), of(Section::Energy)),
-            Tensor::new::<f32>("gap", grid.clone(), of(Section::Gap)),
-            Tensor::new::<f32>("residual", grid.clone(), of(Section::Residual)),
-            Tensor::new::<u32>("iterations", grid, of(Section::Iterations)),
-        ];
-        if self.shape.with_tangent {
-            let shape = [&heading.grid.counts()[..], &[self.shape.width().tangent]].concat();
-            tensors.push(Tensor::new::<f32>("tangent", shape, of(Section::Tangent)));
-        }
-        let rows = [
-            (CONTACTS, [Section::Ends, Section::Nodes, Section::Forces]),
-            (TOUCHES, [Section::TouchEnds, Section::TouchNodes, Section::TouchForces]),
-        ];
-        for ((names, [ends, nodes, forces]), before) in rows.into_iter().zip(&self.rows) {
-            if let Some(&count) = before.last() {
-                tensors.push(Tensor::new::<u64>(names[0], vec![self.points + 1], of(ends)));
-                tensors.push(Tensor::new::<u32>(names[1], vec![count], of(nodes)));
-                tensors.push(Tensor::new::<f32>(names[2], vec![count, 3], of(forces)));
-            }
-        }
-        tensors.extend(surface_tensors(surface).into_iter().map(|tensor| tensor.map(Contents::Held)));
+        let tensor = |array: Stored| {
+            let entries = match array.ends() {
+                Some(ends) => self.before(ends).last().copied().unwrap_or(0),
+                None => self.points + usize::from(is_ends(array)),
+            };
+            Tensor::stored(array, heading.grid, entries * self.size(array), Contents::Results(self, array))
+        };
+        let stored = Stored::RESULTS.into_iter().filter(|array| self.shape.has(array.ends().unwrap_or(*array)));
+        let mut tensors: Vec<_> = stored.map(tensor).collect();
+        tensors.extend(surface_tensors(heading.grid, surface).into_iter().map(|tensor| tensor.map(Contents::Held)));
         write_file(output, heading, tensors)
     }
 }
@@ -103,34 +89,31 @@ impl<'a> Results<'a> {
 enum Contents<'a> {
     Held(&'a [u8]),
     /// A column of all points; that of the ends of rows behind a 0.
-    Section(&'a Results<'a>, Section),
+    Results(&'a Results<'a>, Stored),
 }
 
 impl TensorContents for Contents<'_> {
     fn pieces(&self) -> Vec<usize> {
         match self {
             Self::Held(bytes) => bytes.pieces(),
-            Self::Section(results, section) => {
+            Self::Results(results, array) => {
                 let points = (0..results.points).step_by(PIECE);
-                let first: Vec<usize> = match (section, section.ends()) {
-                    (_, Some(ends)) => points.zip(results.before(ends)).map(|(_, &before)| before).collect(),
-                    (Section::Ends | Section::TouchEnds, _) => {
-                        points.map(|point| point + usize::from(point > 0)).collect()
-                    }
-                    _ => points.collect(),
+                let first: Vec<usize> = match array.ends() {
+                    Some(ends) => points.zip(results.before(ends)).map(|(_, &before)| before).collect(),
+                    None if is_ends(*array) => points.map(|point| point + usize::from(point > 0)).collect(),
+                    None => points.collect(),
                 };
-                first.into_iter().map(|entry| entry * results.size(*section)).collect()
+                first.into_iter().map(|entry| entry * results.size(*array)).collect()
             }
         }
     }
 
     fn write(&self, piece: usize, writer: &mut impl Write) -> io::Result<()> {
-        let (results, section) = match self {
+        let (results, array) = match self {
             Self::Held(bytes) => return bytes.write(piece, writer),
-            Self::Section(results, section) => (results, *section),
+            Self::Results(results, array) => (results, *array),
         };
-        let mut end =
-            matches!(section, Section::Ends | Section::TouchEnds).then(|| results.before(section)[piece] as u64);
+        let mut end = is_ends(array).then(|| results.before(array)[piece] as u64);
         if let (Some(end), 0) = (end, piece) {
             writer.write_all(&end.to_le_bytes())?;
         }
@@ -138,12 +121,12 @@ impl TensorContents for Contents<'_> {
             if results.stop.load(Ordering::Relaxed) {
                 return Err(io::Error::other("stopped"));
             }
-            let bytes = block.bytes(section, points.clone(), results.size(section));
+            let bytes = block.bytes(array, points.clone(), results.size(array));
             let Some(before) = end else {
                 writer.write_all(bytes)?;
                 continue;
             };
-            let shift = before.wrapping_sub(block.rows(section, points).start as u64);
+            let shift = before.wrapping_sub(block.rows(array, points).start as u64);
             for bytes in bytes.as_chunks().0 {
                 let shifted = shift.wrapping_add(u64::from_le_bytes(*bytes));
                 writer.write_all(&shifted.to_le_bytes())?;

@@ -61,11 +61,11 @@ impl Store for Columns {
     fn append(&mut self, _first: usize, chunk: &Columns) -> Result<(), SweepError> {
         let points = self.status.capacity();
         let each = |numbers: usize| numbers / chunk.points().max(1);
-        let (joints, tangent) = (each(chunk.torque.len()), each(chunk.tangent.len()));
-        let width = Width { joints, tangent, touches: each(chunk.touches.ends.len()) };
+        let (tangent, touches) = (!chunk.tangent.is_empty(), !chunk.touches.ends.is_empty());
+        let width = Width { joints: each(chunk.torque.len()), tangent, touches };
         let [contacts, touches] = [(&self.contacts, &chunk.contacts), (&self.touches, &chunk.touches)]
             .map(|(rows, more)| rows.nodes.len() + more.nodes.len());
-        let bytes = Columns::bytes(points, width, contacts, touches);
+        let bytes = Columns::size(points, width, contacts, touches);
         self.append(chunk).map_err(|source| SweepError::Memory { points, bytes, source })
     }
     fn note(&mut self, _notice: &str) -> Result<(), SweepError> {

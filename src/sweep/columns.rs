@@ -1,14 +1,13 @@
 //! Results of consecutive grid points as columns, and their form as one block of bytes.
 //!
 //! ```text
-//! u64 first point, u64 points p, u64 contacts c of the object's nodes, u64 touches t of the proxy's
-//! f64 torque[p][d], f64 energy[p], u64 end[p] of each point's contacts among those of the block, u64 the same of
-//! touches or none, f32 tangent[p][d (d + 1) / 2] or none, f32 gap[p], f32 residual[p], u32 iterations[p], u32 node[c],
-//! f32 force[c][3], u32 node[t], f32 force[t][3], u8 status[p]
+//! u64 first point, u64 points, u64 contacts of the object's nodes, u64 touches of the proxy's
+//! the columns, in the order of `Stored::RESULTS`; those of offsets hold the end of each point's row within the block
 //! ```
 
 use crate::JointMatrix;
 use crate::contact::{Equilibrium, NodeForce, Status};
+use crate::dataset::{Axes, Stored};
 use bytemuck::Pod;
 use std::collections::{BTreeMap, TryReserveError};
 
@@ -26,9 +25,19 @@ pub(super) struct Shape {
 }
 
 impl Shape {
+    /// Whether a column is stored; of rows, their ends say so.
+    pub fn has(self, array: Stored) -> bool {
+        match array {
+            Stored::Tangent => self.with_tangent,
+            Stored::ContactOffsets => self.with_forces,
+            Stored::TouchOffsets => self.with_touches,
+            _ => true,
+        }
+    }
+
     /// Returns the number of entries in each column of fixed width.
     pub fn width(self) -> Width {
-        Width::new(self.joints, self.with_tangent, self.with_touches)
+        Width { joints: self.joints, tangent: self.with_tangent, touches: self.with_touches }
     }
 }
 
@@ -37,27 +46,32 @@ impl Shape {
 pub(super) struct Width {
     /// Torques.
     pub joints: usize,
-    /// Entries of the tangent; 0 where tangents are not stored.
-    pub tangent: usize,
-    /// Ends of rows of touches: 1, or 0 where touches are not stored.
-    pub touches: usize,
+    /// Whether tangents are stored.
+    pub tangent: bool,
+    /// Whether touches are stored.
+    pub touches: bool,
 }
 
 impl Width {
-    /// Bytes of an entry of each column, by [`Section`]: one a point, a contact or a touch.
-    pub fn entries(self) -> [usize; SECTIONS] {
-        Opening { first: 0, points: 1, contacts: 1, touches: 1 }.lengths(self)
+    /// Numbers of an entry of a column: of a point, a contact or a touch. 0 where it is not stored.
+    pub fn numbers(self, array: Stored) -> usize {
+        match array.description().axes {
+            Axes::Joints(_) => self.joints,
+            Axes::Triangle(_) => usize::from(self.tangent) * JointMatrix::entries(self.joints),
+            Axes::Grid => 1,
+            Axes::Own(_) if array == Stored::TouchOffsets => self.touches.into(),
+            Axes::Own(axes) => axes.iter().skip(1).map(|(_, length)| length).product(),
+        }
     }
 
-    /// Creates the widths for `joints` joints.
-    pub fn new(joints: usize, with_tangent: bool, with_touches: bool) -> Self {
-        let tangent = if with_tangent { JointMatrix::entries(joints) } else { 0 };
-        Self { joints, tangent, touches: with_touches.into() }
+    /// Bytes of an entry of a column.
+    pub fn bytes(self, array: Stored) -> usize {
+        self.numbers(array) * array.description().dtype.bitsize() / 8
     }
 }
 
 /// Number of columns.
-pub(super) const SECTIONS: usize = 13;
+pub(super) const COLUMNS: usize = Stored::RESULTS.len();
 
 /// Results of consecutive grid points. Field by field as in [`crate::dataset::Dataset`].
 #[derive(Default)]
@@ -92,12 +106,6 @@ impl Rows {
         self.nodes.extend(row.iter().map(|on| on.node));
         self.forces.extend(row.iter().flat_map(|on| on.force.as_vec3().to_array()));
         self.ends.push(self.nodes.len() as u64);
-    }
-
-    fn clear(&mut self) {
-        self.ends.clear();
-        self.nodes.clear();
-        self.forces.clear();
     }
 
     fn append(&mut self, other: &Self) -> Result<(), TryReserveError> {
@@ -136,35 +144,6 @@ impl Rows {
     }
 }
 
-/// The columns of a block, in their order there.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Section {
-    Torque,
-    Energy,
-    Ends,
-    TouchEnds,
-    Tangent,
-    Gap,
-    Residual,
-    Iterations,
-    Nodes,
-    Forces,
-    TouchNodes,
-    TouchForces,
-    Status,
-}
-
-impl Section {
-    /// The ends of the rows that the column is of, where it has rows.
-    pub fn ends(self) -> Option<Self> {
-        match self {
-            Self::Nodes | Self::Forces => Some(Self::Ends),
-            Self::TouchNodes | Self::TouchForces => Some(Self::TouchEnds),
-            _ => None,
-        }
-    }
-}
-
 /// New results of single points, by number of the grid point: one row of columns each.
 pub(super) type Replaced = BTreeMap<usize, Columns>;
 
@@ -184,56 +163,123 @@ impl Opening {
 
     /// Reads it; `None` where its numbers cannot be counted to.
     pub fn of(bytes: [u8; Self::BYTES]) -> Option<Self> {
-        let mut rest = &bytes[..];
-        let mut number = || usize::try_from(take::<u64>(&mut rest, 1)?[0]).ok();
-        Some(Self { first: number()?, points: number()?, contacts: number()?, touches: number()? })
+        let numbers: [[u8; 8]; 4] = bytemuck::cast(bytes);
+        let [first, points, contacts, touches] = numbers.map(|number| usize::try_from(u64::from_le_bytes(number)).ok());
+        Some(Self { first: first?, points: points?, contacts: contacts?, touches: touches? })
     }
 
     fn bytes(self) -> [[u8; 8]; 4] {
         [self.first, self.points, self.contacts, self.touches].map(|count| (count as u64).to_le_bytes())
     }
 
-    /// Lengths of the columns behind it, by [`Section`] (bytes).
-    fn lengths(self, width: Width) -> [usize; SECTIONS] {
-        let Self { points: p, contacts: c, touches: t, .. } = self;
-        let wide = [(p, width.joints * 8), (p, 8), (p, 8), (p, width.touches * 8)];
-        let narrow = [(p, width.tangent * 4), (p, 4), (p, 4), (p, 4), (c, 4), (c, 12), (t, 4), (t, 12), (p, 1)];
-        let mut lengths = [0; SECTIONS];
-        for (length, (count, size)) in lengths.iter_mut().zip(wide.into_iter().chain(narrow)) {
-            *length = count.saturating_mul(size);
-        }
-        lengths
+    /// Lengths of the columns behind it (bytes).
+    fn lengths(self, width: Width) -> [usize; COLUMNS] {
+        let Self { points, contacts, touches, .. } = self;
+        Stored::RESULTS.map(|array| {
+            let entries = match array.ends() {
+                None => points,
+                Some(Stored::ContactOffsets) => contacts,
+                Some(_) => touches,
+            };
+            entries.saturating_mul(width.bytes(array))
+        })
     }
 
     /// The columns behind it, `bytes` being all of them.
-    pub fn sections(self, bytes: &[u8], width: Width) -> [&[u8]; SECTIONS] {
+    pub fn columns(self, bytes: &[u8], width: Width) -> [&[u8]; COLUMNS] {
         let mut rest = bytes;
         self.lengths(width).map(|length| {
-            let (section, behind) = rest.split_at(length);
+            let (column, behind) = rest.split_at(length);
             rest = behind;
-            section
+            column
         })
     }
 
     /// Length of all columns behind it (bytes).
-    pub fn columns(self, width: Width) -> usize {
+    pub fn length(self, width: Width) -> usize {
         self.lengths(width).into_iter().fold(0, usize::saturating_add)
     }
 }
 
+/// A column of numbers, whatever their type.
+trait Numbers {
+    fn empty(&mut self);
+    /// Makes room for so many more; an error where there is no such memory.
+    fn make_room(&mut self, more: usize) -> Result<(), TryReserveError>;
+    /// Adds the numbers in `bytes`, which need not be aligned.
+    fn add(&mut self, bytes: &[u8]);
+    /// Takes the numbers in `bytes` in the place of those from number `first` on.
+    fn put(&mut self, first: usize, bytes: &[u8]);
+}
+
+impl<T: Pod> Numbers for Vec<T> {
+    fn empty(&mut self) {
+        self.clear();
+    }
+
+    fn make_room(&mut self, more: usize) -> Result<(), TryReserveError> {
+        self.try_reserve_exact(more)
+    }
+
+    fn add(&mut self, bytes: &[u8]) {
+        self.extend(bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned::<T>));
+    }
+
+    fn put(&mut self, first: usize, bytes: &[u8]) {
+        let numbers = bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned);
+        self[first..].iter_mut().zip(numbers).for_each(|(number, new)| *number = new);
+    }
+}
+
 impl Columns {
+    /// The columns as bytes, in the order of [`Stored::RESULTS`].
+    pub fn bytes(&self) -> [&[u8]; COLUMNS] {
+        let Self { contacts, touches, .. } = self;
+        [
+            bytemuck::cast_slice(&self.torque),
+            bytemuck::cast_slice(&self.energy),
+            bytemuck::cast_slice(&self.tangent),
+            bytemuck::cast_slice(&self.gap),
+            &self.status,
+            bytemuck::cast_slice(&self.residual),
+            bytemuck::cast_slice(&self.iterations),
+            bytemuck::cast_slice(&contacts.ends),
+            bytemuck::cast_slice(&contacts.nodes),
+            bytemuck::cast_slice(&contacts.forces),
+            bytemuck::cast_slice(&touches.ends),
+            bytemuck::cast_slice(&touches.nodes),
+            bytemuck::cast_slice(&touches.forces),
+        ]
+    }
+
+    /// The same, to be changed.
+    fn all(&mut self) -> [(Stored, &mut dyn Numbers); COLUMNS] {
+        let Self { contacts, touches, .. } = self;
+        let columns: [&mut dyn Numbers; COLUMNS] = [
+            &mut self.torque,
+            &mut self.energy,
+            &mut self.tangent,
+            &mut self.gap,
+            &mut self.status,
+            &mut self.residual,
+            &mut self.iterations,
+            &mut contacts.ends,
+            &mut contacts.nodes,
+            &mut contacts.forces,
+            &mut touches.ends,
+            &mut touches.nodes,
+            &mut touches.forces,
+        ];
+        let mut arrays = Stored::RESULTS.into_iter();
+        columns.map(|column| (arrays.next().unwrap_or(Stored::Status), column))
+    }
+
     /// Room for `points` points of `width`, contacts aside; an error where there is no such memory.
     pub fn with_room(points: usize, width: Width) -> Result<Self, TryReserveError> {
         let mut columns = Self::default();
-        columns.torque.try_reserve_exact(points.saturating_mul(width.joints))?;
-        columns.tangent.try_reserve_exact(points.saturating_mul(width.tangent))?;
-        columns.energy.try_reserve_exact(points)?;
-        columns.gap.try_reserve_exact(points)?;
-        columns.residual.try_reserve_exact(points)?;
-        columns.iterations.try_reserve_exact(points)?;
-        columns.status.try_reserve_exact(points)?;
-        columns.contacts.ends.try_reserve_exact(points)?;
-        columns.touches.ends.try_reserve_exact(points.saturating_mul(width.touches))?;
+        for (array, column) in columns.all().into_iter().filter(|(array, _)| array.ends().is_none()) {
+            column.make_room(points.saturating_mul(width.numbers(array)))?;
+        }
         Ok(columns)
     }
 
@@ -243,21 +289,13 @@ impl Columns {
     }
 
     /// Bytes of `points` points of `width` with `contacts` and `touches` in all.
-    pub fn bytes(points: usize, width: Width, contacts: usize, touches: usize) -> usize {
-        Opening { first: 0, points, contacts, touches }.columns(width)
+    pub fn size(points: usize, width: Width, contacts: usize, touches: usize) -> usize {
+        Opening { first: 0, points, contacts, touches }.length(width)
     }
 
     /// No points, in the room there is.
     pub fn clear(&mut self) {
-        self.torque.clear();
-        self.energy.clear();
-        self.tangent.clear();
-        self.gap.clear();
-        self.residual.clear();
-        self.iterations.clear();
-        self.status.clear();
-        self.contacts.clear();
-        self.touches.clear();
+        self.all().into_iter().for_each(|(_, column)| column.empty());
     }
 
     /// Adds the equilibrium of the next point.
@@ -281,7 +319,7 @@ impl Columns {
             && on_proxy.iter().all(|contact| contact.force.as_vec3().is_finite());
         self.iterations.push(*iterations);
         let tangent = tangent.filter(|tangent| sound && tangent.is_finite());
-        let entries = self.tangent.len() + shape.width().tangent;
+        let entries = self.tangent.len() + shape.width().numbers(Stored::Tangent);
         self.tangent.extend(tangent.iter().flat_map(JointMatrix::lower).map(|entry| entry as f32));
         self.tangent.resize(entries, 0.0);
         if sound {
@@ -307,7 +345,7 @@ impl Columns {
     pub fn push_free(&mut self, gap: f32, shape: Shape) {
         self.torque.resize(self.torque.len() + shape.joints, 0.0);
         self.energy.push(0.0);
-        self.tangent.resize(self.tangent.len() + shape.width().tangent, 0.0);
+        self.tangent.resize(self.tangent.len() + shape.width().numbers(Stored::Tangent), 0.0);
         self.gap.push(gap);
         self.residual.push(0.0);
         self.iterations.push(0);
@@ -322,13 +360,9 @@ impl Columns {
     pub fn append(&mut self, chunk: &Self) -> Result<(), TryReserveError> {
         self.contacts.append(&chunk.contacts)?;
         self.touches.append(&chunk.touches)?;
-        self.torque.extend_from_slice(&chunk.torque);
-        self.energy.extend_from_slice(&chunk.energy);
-        self.tangent.extend_from_slice(&chunk.tangent);
-        self.gap.extend_from_slice(&chunk.gap);
-        self.residual.extend_from_slice(&chunk.residual);
-        self.iterations.extend_from_slice(&chunk.iterations);
-        self.status.extend_from_slice(&chunk.status);
+        for ((_, column), bytes) in self.of_points().zip(chunk.of_points_as_bytes()) {
+            column.add(bytes);
+        }
         Ok(())
     }
 
@@ -341,74 +375,41 @@ impl Columns {
             return Ok(());
         }
         for (number, row) in rows {
-            let (point, joints, entries) = (number - first, row.torque.len(), row.tangent.len());
-            self.torque[point * joints..(point + 1) * joints].copy_from_slice(&row.torque);
-            self.energy[point] = row.energy[0];
-            self.tangent[point * entries..(point + 1) * entries].copy_from_slice(&row.tangent);
-            self.gap[point] = row.gap[0];
-            self.residual[point] = row.residual[0];
-            self.iterations[point] = row.iterations[0];
-            self.status[point] = row.status[0];
+            for ((array, column), bytes) in self.of_points().zip(row.of_points_as_bytes()) {
+                let numbers = 8 * bytes.len() / array.description().dtype.bitsize();
+                column.put((number - first) * numbers, bytes);
+            }
         }
         self.contacts = self.contacts.replaced(|point| Some(&replaced.get(&(first + point))?.contacts))?;
         self.touches = self.touches.replaced(|point| Some(&replaced.get(&(first + point))?.touches))?;
         Ok(())
     }
 
-    /// The opening of the block of these points, of which the first has number `first`, and its columns.
-    pub fn block(&self, first: usize) -> ([[u8; 8]; 4], [&[u8]; SECTIONS]) {
-        let Self { contacts, touches, .. } = self;
-        let opening =
-            Opening { first, points: self.points(), contacts: contacts.nodes.len(), touches: touches.nodes.len() };
-        let columns = [
-            bytemuck::cast_slice(&self.torque),
-            bytemuck::cast_slice(&self.energy),
-            bytemuck::cast_slice(&contacts.ends),
-            bytemuck::cast_slice(&touches.ends),
-            bytemuck::cast_slice(&self.tangent),
-            bytemuck::cast_slice(&self.gap),
-            bytemuck::cast_slice(&self.residual),
-            bytemuck::cast_slice(&self.iterations),
-            bytemuck::cast_slice(&contacts.nodes),
-            bytemuck::cast_slice(&contacts.forces),
-            bytemuck::cast_slice(&touches.nodes),
-            bytemuck::cast_slice(&touches.forces),
-            &self.status,
-        ];
-        (opening.bytes(), columns)
+    /// The columns over the points, rows of forces aside.
+    fn of_points(&mut self) -> impl Iterator<Item = (Stored, &mut dyn Numbers)> {
+        self.all().into_iter().filter(|(array, _)| !matches!(array.description().axes, Axes::Own(_)))
+    }
+
+    fn of_points_as_bytes(&self) -> impl Iterator<Item = &[u8]> {
+        let columns = Stored::RESULTS.into_iter().zip(self.bytes());
+        columns.filter(|(array, _)| !matches!(array.description().axes, Axes::Own(_))).map(|(_, bytes)| bytes)
+    }
+
+    /// The opening of the block of these points, of which the first has number `first`.
+    pub fn opening(&self, first: usize) -> [[u8; 8]; 4] {
+        let [contacts, touches] = [&self.contacts, &self.touches].map(|rows| rows.nodes.len());
+        Opening { first, points: self.points(), contacts, touches }.bytes()
     }
 
     /// Reads the block of the points from number `first` on; `None` when it is none.
     pub fn decode(block: &[u8], first: usize, width: Width) -> Option<Self> {
-        let (opening, mut rest) = block.split_first_chunk()?;
+        let (opening, rest) = block.split_first_chunk()?;
         let opening = Opening::of(*opening)?;
-        if opening.first != first || rest.len() != opening.columns(width) {
+        if opening.first != first || rest.len() != opening.length(width) {
             return None;
         }
-        let Opening { points, contacts, touches, .. } = opening;
-        let mut columns = Self {
-            torque: take(&mut rest, points * width.joints)?,
-            energy: take(&mut rest, points)?,
-            ..Self::default()
-        };
-        columns.contacts.ends = take(&mut rest, points)?;
-        columns.touches.ends = take(&mut rest, points * width.touches)?;
-        columns.tangent = take(&mut rest, points * width.tangent)?;
-        columns.gap = take(&mut rest, points)?;
-        columns.residual = take(&mut rest, points)?;
-        columns.iterations = take(&mut rest, points)?;
-        for (rows, count) in [(&mut columns.contacts, contacts), (&mut columns.touches, touches)] {
-            rows.nodes = take(&mut rest, count)?;
-            rows.forces = take(&mut rest, 3 * count)?;
-        }
-        columns.status = take(&mut rest, points)?;
+        let mut columns = Self::default();
+        columns.all().into_iter().zip(opening.columns(rest, width)).for_each(|((_, column), bytes)| column.add(bytes));
         (columns.contacts.fit() && columns.touches.fit()).then_some(columns)
     }
-}
-
-/// Takes `count` numbers off the front of `bytes`, which need not be aligned.
-fn take<T: Pod>(bytes: &mut &[u8], count: usize) -> Option<Vec<T>> {
-    let (front, rest) = bytes.split_at_checked(count.checked_mul(size_of::<T>())?)?;
-    *bytes = rest;
-    Some(bytemuck::pod_collect_to_vec(front))
 }

@@ -313,10 +313,7 @@ impl Lattice for UniformGrid<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        field::synthetic,
-        sweep::{columns::Section, table::Block},
-    };
+    use crate::{dataset::Stored, field::synthetic, sweep::table::Block};
 
     const SHAPE: Shape =
         Shape { joints: 1, surface_nodes: 9, with_forces: true, with_touches: false, with_tangent: false };
@@ -372,11 +369,11 @@ mod tests {
         table.replaced = new();
         whole.replace(0, &replaced).unwrap();
         let expected = columns(&[1.0, 4.0, 3.0, 2.0, 5.0]);
-        assert_eq!(whole.block(0), expected.block(0));
-        for section in [Section::Energy, Section::Nodes, Section::Forces, Section::Status] {
-            let size = SHAPE.width().entries()[section as usize];
+        assert_eq!(whole.bytes(), expected.bytes());
+        for section in [Stored::Energy, Stored::ContactNodes, Stored::ContactForces, Stored::Status] {
+            let size = SHAPE.width().bytes(section);
             let runs = table.runs(0..5).map(|(block, points)| block.bytes(section, points, size).to_vec());
-            assert_eq!(runs.collect::<Vec<_>>().concat(), expected.block(0).1[section as usize]);
+            assert_eq!(runs.collect::<Vec<_>>().concat(), expected.bytes()[section as usize]);
             assert_eq!(table.runs(1..4).map(|(_, points)| points).collect::<Vec<_>>(), [0..1, 0..1, 0..1]);
         }
         for (point, energy) in [1.0, 4.0, 3.0, 2.0, 5.0].into_iter().enumerate() {
@@ -389,6 +386,6 @@ mod tests {
         // A block on its own knows its numbers.
         let mut block = columns(&[3.0, 0.0, 5.0]);
         block.replace(2, &replaced).unwrap();
-        assert_eq!(block.block(2), columns(&[3.0, 2.0, 5.0]).block(2));
+        assert_eq!(block.bytes(), columns(&[3.0, 2.0, 5.0]).bytes());
     }
 }

@@ -71,7 +71,7 @@ impl Binding {
 
     /// Numbers that each point has.
     pub fn width(&self) -> Width {
-        Width::new(self.grid.joints(), self.with_tangent, self.with_touches)
+        Width { joints: self.grid.joints(), tangent: self.with_tangent, touches: self.with_touches }
     }
 
     /// Returns the first difference from `other` that forbids to continue it; the date may differ.
@@ -145,9 +145,9 @@ impl Part {
 
     /// Adds a chunk whose first point has number `first`.
     pub fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError> {
-        let (opening, columns) = chunk.block(first);
+        let opening = chunk.opening(first);
         let mut body = vec![opening.as_flattened()];
-        body.extend(columns);
+        body.extend(chunk.bytes());
         self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })
     }
 
@@ -211,7 +211,7 @@ impl Part {
             if !body.starts_with(&NOTICE) {
                 let (opening, columns) = body.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
                 let opening = Opening::of(*opening).ok_or(io::ErrorKind::InvalidData)?;
-                blocks.push(Block { first: opening.first, sections: opening.sections(columns, width) });
+                blocks.push(Block { first: opening.first, columns: opening.columns(columns, width) });
             }
         }
         Ok(Table::new(width, blocks))

@@ -1,9 +1,10 @@
 //! The results of all grid points, read point by point in any order: in memory, or in the part on the disk.
 
-use super::columns::{Columns, Replaced, SECTIONS, Section, Width};
+use super::columns::{COLUMNS, Columns, Replaced, Width};
 use crate::{
     JointVector,
     contact::{Equilibrium, NodeForce, Status},
+    dataset::Stored,
 };
 use bytemuck::Pod;
 use glam::DVec3;
@@ -17,12 +18,12 @@ pub(super) struct Table<'a> {
     pub replaced: Replaced,
 }
 
-/// Columns of consecutive points as bytes, by [`Section`]; they need not be aligned.
+/// Columns of consecutive points as bytes, by [`Stored`]; they need not be aligned.
 #[derive(Clone, Copy)]
 pub(super) struct Block<'a> {
     /// Number of the first point.
     pub first: usize,
-    pub sections: [&'a [u8]; SECTIONS],
+    pub columns: [&'a [u8]; COLUMNS],
 }
 
 /// The result of one point.
@@ -51,56 +52,58 @@ impl PointResult {
 impl<'a> Block<'a> {
     /// The block of `columns`, the first of whose points has number `first`.
     pub fn of(columns: &'a Columns, first: usize) -> Self {
-        Self { first, sections: columns.block(first).1 }
+        Self { first, columns: columns.bytes() }
     }
 
-    fn number<T: Pod>(&self, section: Section, index: usize) -> T {
+    fn number<T: Pod>(&self, array: Stored, index: usize) -> T {
         let size = size_of::<T>();
-        bytemuck::pod_read_unaligned(&self.sections[section as usize][index * size..(index + 1) * size])
+        bytemuck::pod_read_unaligned(&self.columns[array as usize][index * size..(index + 1) * size])
     }
 
     fn result(&self, row: usize, joints: usize) -> PointResult {
         let mut torque = JointVector::zeros(joints);
         for (joint, tau) in torque.iter_mut().enumerate() {
-            *tau = self.number(Section::Torque, row * joints + joint);
+            *tau = self.number(Stored::Torque, row * joints + joint);
         }
         PointResult {
             status: self.status(row),
             torque,
-            energy: self.number(Section::Energy, row),
-            gap: self.number(Section::Gap, row),
-            residual: self.number(Section::Residual, row),
-            iterations: self.number(Section::Iterations, row),
+            energy: self.number(Stored::Energy, row),
+            gap: self.number(Stored::Gap, row),
+            residual: self.number(Stored::Residual, row),
+            iterations: self.number(Stored::Iterations, row),
         }
     }
 
     fn status(&self, row: usize) -> Status {
-        Status::from_number(self.sections[Section::Status as usize][row]).unwrap_or(Status::Outside)
+        Status::from_number(self.columns[Stored::Status as usize][row]).unwrap_or(Status::Outside)
     }
 
-    /// The column `section` of points, an entry of which takes `size` bytes.
-    pub fn bytes(&self, section: Section, points: Range<usize>, size: usize) -> &'a [u8] {
-        let entries = match section.ends() {
+    /// The column `array` of points, an entry of which takes `size` bytes.
+    pub fn bytes(&self, array: Stored, points: Range<usize>, size: usize) -> &'a [u8] {
+        let entries = match array.ends() {
             Some(ends) => self.rows(ends, points),
             None => points,
         };
-        &self.sections[section as usize][size * entries.start..size * entries.end]
+        &self.columns[array as usize][size * entries.start..size * entries.end]
     }
 
     fn points(&self) -> usize {
-        self.sections[Section::Status as usize].len()
+        self.columns[Stored::Status as usize].len()
     }
 
     fn forces(&self, row: usize) -> Vec<NodeForce> {
         let force = |contact: usize| NodeForce {
-            node: self.number(Section::Nodes, contact),
-            force: DVec3::from_array([0, 1, 2].map(|k| self.number::<f32>(Section::Forces, 3 * contact + k).into())),
+            node: self.number(Stored::ContactNodes, contact),
+            force: DVec3::from_array(
+                [0, 1, 2].map(|k| self.number::<f32>(Stored::ContactForces, 3 * contact + k).into()),
+            ),
         };
-        self.rows(Section::Ends, row..row + 1).map(force).collect()
+        self.rows(Stored::ContactOffsets, row..row + 1).map(force).collect()
     }
 
     /// Which contacts, or touches, are those of points; `ends` are their ends.
-    pub fn rows(&self, ends: Section, points: Range<usize>) -> Range<usize> {
+    pub fn rows(&self, ends: Stored, points: Range<usize>) -> Range<usize> {
         let before = |point: usize| point.checked_sub(1).map_or(0, |row| self.number::<u64>(ends, row) as usize);
         before(points.start)..before(points.end)
     }

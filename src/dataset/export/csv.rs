@@ -2,8 +2,12 @@
 //! force. The first row names each column and its unit; all other entries are numbers, with a point, in the shortest
 //! form that reads back to the same value.
 
-use super::super::{Axis, Dataset, Error, replace_file};
+use super::super::{
+    Axis, Dataset, Error, Grid, Stored, replace_file,
+    stored::{Axes, Description},
+};
 use crate::csv::{Table, quoted};
+use safetensors::Dtype;
 use std::{
     fmt::{self, Debug, Display},
     io::{self, Write},
@@ -34,29 +38,38 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
 }
 
 fn write_points(dataset: &Dataset, writer: &mut impl Write) -> io::Result<()> {
-    let axes = &dataset.grid.axes;
-    let Dataset { energy, gap, residual, iterations, contacts, .. } = dataset;
+    let grid = &dataset.grid;
+    // Columns of one number a point.
+    let one = |array: &Stored| matches!(array.description().axes, Axes::Grid);
+    let columns: Vec<_> =
+        Stored::ALL.into_iter().filter(one).filter_map(|array| Some((array, dataset.stored(array)?))).collect();
     let mut table = Table::new(writer);
-    table.fields(axes.iter().map(|axis| quoted(&format!("{} [{}]", axis.name, axis.unit))))?;
-    table.fields(axes.iter().map(effort))?;
-    let optional = [
-        ("energy [J]", energy.is_some()),
-        ("gap [m]", gap.is_some()),
-        (STATUS, true),
-        ("residual [1]", residual.is_some()),
-        ("iterations", iterations.is_some()),
-        ("contacts", contacts.is_some()),
-    ];
-    table.fields(optional.iter().filter(|(_, present)| *present).map(|(name, _)| name))?.end()?;
-    for point in 0..dataset.grid.points() {
-        let numbers = [&dataset.grid.configuration(point)[..], dataset.torque(point)].concat();
-        table.fields(numbers.iter().chain(energy.as_ref().map(|energy| &energy[point])).map(Shortest))?;
-        table.fields(gap.as_ref().map(|gap| Shortest(&gap[point])))?.field(dataset.status[point])?;
-        table.fields(residual.as_ref().map(|residual| Shortest(&residual[point])))?;
-        table.fields(iterations.as_ref().map(|iterations| iterations[point]))?;
-        table.fields(contacts.as_ref().map(|_| dataset.forces(point).len()))?.end()?;
+    table.fields(grid.axes.iter().map(|axis| quoted(&format!("{} [{}]", axis.name, axis.unit))))?;
+    table.fields(grid.axes.iter().map(effort))?;
+    table.fields(columns.iter().map(|(array, _)| heading(*array, grid)))?;
+    table.fields(dataset.contacts.as_ref().map(|_| "contacts"))?.end()?;
+    for point in 0..grid.points() {
+        table.fields(grid.configuration(point).iter().chain(dataset.torque(point)).map(Shortest))?;
+        for (array, bytes) in &columns {
+            match array.description().dtype {
+                Dtype::F64 => table.field(Shortest(&bytemuck::cast_slice::<u8, f64>(bytes)[point]))?,
+                Dtype::F32 => table.field(Shortest(&bytemuck::cast_slice::<u8, f32>(bytes)[point]))?,
+                Dtype::U32 => table.field(bytemuck::cast_slice::<u8, u32>(bytes)[point])?,
+                _ => table.field(bytes[point])?,
+            };
+        }
+        table.fields(dataset.contacts.as_ref().map(|_| dataset.forces(point).len()))?.end()?;
     }
     Ok(())
+}
+
+/// Heading of a column: its name, and the unit of what is measured.
+fn heading(array: Stored, grid: &Grid) -> String {
+    match array.description() {
+        _ if array == Stored::Status => STATUS.to_owned(),
+        Description { name, dtype: Dtype::F64 | Dtype::F32, .. } => format!("{name} [{}]", array.unit(grid)),
+        Description { name, .. } => (*name).to_owned(),
+    }
 }
 
 fn write_contacts(dataset: &Dataset, writer: &mut impl Write) -> io::Result<()> {

@@ -11,7 +11,7 @@
 
 use super::{
     super::{Dataset, Error, Grid, file, replace_file},
-    meaning::{Meaning, lines, lines_name, meaning},
+    meaning::{Meaning, lines, lines_name},
 };
 use hdf5_writer::{AttributeBuilder, ByteOrder, DatasetBuilder, Datatype, Hdf5Builder, Hdf5WritePlan, WriteOptions};
 use safetensors::Dtype;
@@ -31,14 +31,13 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
 
 fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {
     let grid = &dataset.grid;
-    let tensors = file::tensors(dataset);
-    let over_grid: Vec<&str> =
-        tensors.iter().map(|tensor| tensor.name).filter(|name| meaning(grid, name).of_grid > 0).collect();
-    let mut builder = Hdf5Builder::new();
-    for tensor in &tensors {
+    let (mut builder, mut over_grid) = (Hdf5Builder::new(), Vec::new());
+    for (array, tensor) in file::arrays(dataset) {
+        let meaning = Meaning::of(array, grid);
+        over_grid.extend((meaning.of_grid > 0).then_some(tensor.name));
         let shape: Vec<u64> = tensor.shape.iter().map(|&count| count as u64).collect();
         let array = DatasetBuilder::new(tensor.name, datatype(tensor.dtype)?, shape).raw_data(tensor.contents);
-        builder = builder.dataset(described(array, &meaning(grid, tensor.name))?);
+        builder = builder.dataset(described(array, &meaning)?);
     }
     for k in 0..grid.joints() {
         builder = builder.dataset(scale(grid, k, &over_grid)?);

@@ -7,7 +7,7 @@
 
 use super::{
     super::{Dataset, Error, file, replace_file},
-    meaning::{Meaning, lines, lines_name, meaning},
+    meaning::{Meaning, lines, lines_name},
 };
 use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
 use safetensors::Dtype;
@@ -80,7 +80,7 @@ impl<W: Seek> Seek for Quiet<W> {
 
 fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Result<()> {
     let grid = &dataset.grid;
-    for tensor in file::tensors(dataset) {
+    for (_, tensor) in file::arrays(dataset) {
         let (name, shape) = (tensor.name, &tensor.shape);
         match tensor.dtype {
             Dtype::F64 => array(&mut zip, name, shape, bytemuck::cast_slice::<u8, f64>(tensor.contents)),
@@ -113,10 +113,9 @@ fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Resul
 /// Each array of numbers with its unit, and with its axes.
 fn meanings(dataset: &Dataset) -> (Vec<[String; 2]>, Vec<[String; 2]>) {
     let grid = &dataset.grid;
-    let arrays = file::tensors(dataset).into_iter().map(|tensor| tensor.name).chain(["q"]).map(|name| {
-        let Meaning { unit, axes, .. } = meaning(grid, name);
-        (name.to_owned(), unit, axes.join(", "))
-    });
+    let described = |(name, Meaning { unit, axes, .. }): (&str, Meaning)| (name.to_owned(), unit, axes.join(", "));
+    let arrays = file::arrays(dataset).map(|(array, tensor)| (tensor.name, Meaning::of(array, grid)));
+    let arrays = arrays.chain([("q", Meaning::of_configurations(grid))]).map(described);
     let lines = grid.axes.iter().enumerate().map(|(k, axis)| (lines_name(k), axis.unit.clone(), axis.name.clone()));
     arrays.chain(lines).map(|(name, unit, axes)| ([name.clone(), unit], [name, axes])).unzip()
 }

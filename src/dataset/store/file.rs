@@ -156,7 +156,7 @@ pub(in crate::dataset) fn save(
         Tensor::new::<f32>("node_gap", vec![gap.len()], bytemuck::cast_slice(&gap)),
         Tensor::new::<u8>("node_status", vec![status.len()], &status),
     ];
-    tensors.extend(surface.into_iter().flat_map(surface_tensors));
+    tensors.extend(surface.into_iter().flat_map(|surface| surface_tensors(heading.grid, surface)));
     write_container(target, Kind { format: FORMAT, store: Some(&shape) }, heading, tensors)
 }
 
@@ -181,7 +181,7 @@ fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Datas
     let count = records.len() / wide;
     let gap = file.take::<f32>("node_gap", &[Some(count)])?;
     let status = file.take::<u8>("node_status", &[Some(count)])?;
-    let surface = file.surface()?;
+    let surface = file.surface(&grid)?;
     file.finish()?;
     let found: usize = present.iter().map(|nodes| nodes.count_ones() as usize).sum();
     if found != count {
