@@ -185,13 +185,15 @@ struct Report {
 
 /// Runs what the command line `arguments`, the program's name first, asks for; returns the exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    // Before the command line is parsed, which takes memory.
+    memory::tell_shortage(arguments.iter().any(|argument| argument == "--json"));
     let parsed = command_line().try_get_matches_from(arguments);
     let parsed = parsed.and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, matches)));
     let (line, matches) = match parsed {
         Ok(parsed) => parsed,
         Err(error) => return usage(&error),
     };
-    memory::tell_shortage(line.json);
     crash::let_go_first();
     // What refines a grid keeps nothing before its end.
     let refines = matches.subcommand().is_some_and(|(_, given)| given.try_contains_id("refine").unwrap_or(false));

@@ -12,7 +12,7 @@ const TOO_MANY_POINTS: &str = "the grid has too many points";
 /// `Err` says what is wrong.
 pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
     let points = dataset.grid.check()?;
-    for (array, bytes) in Stored::ALL.into_iter().filter_map(|array| Some((array, dataset.stored(array)?))) {
+    for (array, bytes) in Stored::all().filter_map(|array| Some((array, dataset.stored(array)?))) {
         length(array, bytes, &dataset.grid)?;
         match array.description().dtype {
             Dtype::F64 => finite(array, bytemuck::cast_slice(bytes), |x: &f64| x.is_finite())?,

@@ -148,7 +148,7 @@ impl<C> Tensor<C> {
 
 /// The arrays that a dataset has.
 pub(super) fn arrays(dataset: &Dataset) -> impl Iterator<Item = (Stored, Tensor<&[u8]>)> {
-    Stored::ALL.into_iter().filter_map(|array| {
+    Stored::all().filter_map(|array| {
         let bytes = dataset.stored(array)?;
         Some((array, Tensor::stored(array, &dataset.grid, bytes.len(), bytes)))
     })
@@ -157,7 +157,7 @@ pub(super) fn arrays(dataset: &Dataset) -> impl Iterator<Item = (Stored, Tensor<
 /// The tensors of an object's geometry, in a file of a dataset over `grid`.
 pub(crate) fn surface_tensors<'a>(grid: &Grid, surface: &'a Surface) -> Vec<Tensor<&'a [u8]>> {
     let tensor = |array| surface.stored(array).map(|bytes| Tensor::stored(array, grid, bytes.len(), bytes));
-    Stored::ALL.into_iter().filter_map(tensor).collect()
+    Stored::all().filter_map(tensor).collect()
 }
 
 /// Memory of all columns (bytes).

@@ -34,7 +34,7 @@ pub(crate) use file::{
     write_container, write_file,
 };
 pub use grid::{Axis, Grid, JointLabel};
-pub(crate) use stored::{Axes, CONTACTS, Stored, TOUCHES};
+pub(crate) use stored::{Axes, CONTACTS, RESULTS, Stored, TOUCHES};
 pub use summary::{Refinement, StatusCounts, Summary};
 
 use crate::contact::{MeshRipple, NodeForce, Status};

@@ -40,6 +40,7 @@ pub(crate) const TOUCHES: [Stored; 3] = [TouchOffsets, TouchNodes, TouchForces];
 
 /// What an array is.
 pub(crate) struct Description {
+    array: Stored,
     pub name: &'static str,
     pub dtype: Dtype,
     pub axes: Axes,
@@ -47,6 +48,17 @@ pub(crate) struct Description {
     /// What a dataset without it lacks, in words, where that is worth saying.
     pub absent: Option<&'static str>,
 }
+
+/// The arrays that a sweep makes, point by point.
+pub(crate) const RESULTS: [Stored; 13] = {
+    let mut results = [Torque; 13];
+    let mut k = 0;
+    while k < results.len() {
+        results[k] = DESCRIPTIONS[k].array;
+        k += 1;
+    }
+    results
+};
 
 /// Axes of an array.
 #[derive(Clone, Copy)]
@@ -78,29 +90,29 @@ const POINT: &[(&str, usize)] = &[("point", 0)];
 const NODE: &[(&str, usize)] = &[("node", 0), ("xyz", 3)];
 
 /// By [`Stored`].
-const DESCRIPTIONS: [Description; Stored::COUNT] = [
-    of("torque", Dtype::F64, Axes::Joints("joint"), Unit::Effort),
-    of("energy", Dtype::F64, Axes::Grid, Unit::Of("J")).or_absent("stored energy"),
-    of("tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness),
-    of("gap", Dtype::F32, Axes::Grid, Unit::Of("m")).or_absent("gap"),
-    of("status", Dtype::U8, Axes::Grid, Unit::Of("1")),
-    of("residual", Dtype::F32, Axes::Grid, Unit::Of("1")).or_absent("residuals"),
-    of("iterations", Dtype::U32, Axes::Grid, Unit::Of("1")),
-    of("contact_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1")).or_absent("contact forces"),
-    of("contact_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")),
-    of("contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")),
-    of("touch_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1")),
-    of("touch_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")),
-    of("touch_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")),
-    of("surface_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")).or_absent("the object's surface"),
-    of("surface_triangles", Dtype::U32, Axes::Own(&[("triangle", 0), ("corner", 3)]), Unit::Of("1")),
-    of("inner_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")),
-    of("tetrahedra", Dtype::U32, Axes::Own(&[("tetrahedron", 0), ("corner", 4)]), Unit::Of("1")),
-    of("regions", Dtype::U32, Axes::Own(&[("tetrahedron", 0)]), Unit::Of("1")),
+const DESCRIPTIONS: [Description; 18] = [
+    of(Torque, "torque", Dtype::F64, Axes::Joints("joint"), Unit::Effort),
+    of(Energy, "energy", Dtype::F64, Axes::Grid, Unit::Of("J")).or_absent("stored energy"),
+    of(Tangent, "tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness),
+    of(Gap, "gap", Dtype::F32, Axes::Grid, Unit::Of("m")).or_absent("gap"),
+    of(Status, "status", Dtype::U8, Axes::Grid, Unit::Of("1")),
+    of(Residual, "residual", Dtype::F32, Axes::Grid, Unit::Of("1")).or_absent("residuals"),
+    of(Iterations, "iterations", Dtype::U32, Axes::Grid, Unit::Of("1")),
+    of(ContactOffsets, "contact_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1")).or_absent("contact forces"),
+    of(ContactNodes, "contact_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")),
+    of(ContactForces, "contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")),
+    of(TouchOffsets, "touch_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1")),
+    of(TouchNodes, "touch_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")),
+    of(TouchForces, "touch_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")),
+    of(SurfaceNodes, "surface_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")).or_absent("the object's surface"),
+    of(SurfaceTriangles, "surface_triangles", Dtype::U32, Axes::Own(&[("triangle", 0), ("corner", 3)]), Unit::Of("1")),
+    of(InnerNodes, "inner_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")),
+    of(Tetrahedra, "tetrahedra", Dtype::U32, Axes::Own(&[("tetrahedron", 0), ("corner", 4)]), Unit::Of("1")),
+    of(Regions, "regions", Dtype::U32, Axes::Own(&[("tetrahedron", 0)]), Unit::Of("1")),
 ];
 
-const fn of(name: &'static str, dtype: Dtype, axes: Axes, unit: Unit) -> Description {
-    Description { name, dtype, axes, unit, absent: None }
+const fn of(array: Stored, name: &'static str, dtype: Dtype, axes: Axes, unit: Unit) -> Description {
+    Description { array, name, dtype, axes, unit, absent: None }
 }
 
 impl Description {
@@ -110,36 +122,10 @@ impl Description {
 }
 
 impl Stored {
-    /// Number of arrays.
-    const COUNT: usize = 18;
-
     /// All of them, in the order of a file.
-    pub const ALL: [Self; Self::COUNT] = [
-        Torque,
-        Energy,
-        Tangent,
-        Gap,
-        Status,
-        Residual,
-        Iterations,
-        ContactOffsets,
-        ContactNodes,
-        ContactForces,
-        TouchOffsets,
-        TouchNodes,
-        TouchForces,
-        SurfaceNodes,
-        SurfaceTriangles,
-        InnerNodes,
-        Tetrahedra,
-        Regions,
-    ];
-
-    /// Those that a sweep makes, point by point.
-    pub const RESULTS: [Self; 13] = {
-        let [results @ .., _, _, _, _, _] = Self::ALL;
-        results
-    };
+    pub fn all() -> impl Iterator<Item = Self> {
+        DESCRIPTIONS.iter().map(|description| description.array)
+    }
 
     /// The ends of the rows that it is of, where it has rows.
     pub fn ends(self) -> Option<Self> {
@@ -215,7 +201,7 @@ impl Dataset {
     /// feels torque alone.
     #[must_use]
     pub fn absent(&self) -> Vec<&'static str> {
-        let absent = Stored::ALL.into_iter().filter(|array| self.stored(*array).is_none());
+        let absent = Stored::all().filter(|array| self.stored(*array).is_none());
         absent.filter_map(|array| array.description().absent).collect()
     }
 }
@@ -259,7 +245,7 @@ mod tests {
         let first = rows.take_while(|line| line.starts_with('|')).map(|line| line.split('|').nth(1).unwrap());
         let told: Vec<&str> =
             first.flat_map(|cell| cell.split(',')).map(|name| name.trim().trim_matches('`')).collect();
-        let mut stored: Vec<&str> = Stored::ALL.iter().map(|array| array.name()).collect();
+        let mut stored: Vec<&str> = Stored::all().map(|array| array.name()).collect();
         assert!(told.iter().all(|name| stored.contains(name)), "{told:?}");
         stored.retain(|name| !told.contains(name));
         assert!(stored.is_empty(), "docs/dataset.md lacks {stored:?}");
@@ -267,12 +253,7 @@ mod tests {
 
     #[test]
     fn descriptions_stand_at_the_place_of_their_array() {
-        for array in Stored::ALL {
-            let words = format!("{array:?}").chars().fold(String::new(), |name, letter| match letter {
-                'A'..='Z' if !name.is_empty() => format!("{name}_{}", letter.to_ascii_lowercase()),
-                letter => format!("{name}{}", letter.to_ascii_lowercase()),
-            });
-            assert_eq!(array.name(), words);
-        }
+        assert!(Stored::all().all(|array| array.description().array == array));
+        assert_eq!(Stored::all().last(), Some(Regions));
     }
 }

@@ -5,7 +5,9 @@ use super::{
     columns::Shape,
     table::{Block, Table},
 };
-use crate::dataset::{self, Heading, Stored, Surface, Target, Tensor, TensorContents, surface_tensors, write_file};
+use crate::dataset::{
+    self, Heading, RESULTS, Stored, Surface, Target, Tensor, TensorContents, surface_tensors, write_file,
+};
 use rayon::prelude::*;
 use std::{
     io::{self, Write},
@@ -79,7 +81,7 @@ impl<'a> Results<'a> {
             };
             Tensor::stored(array, heading.grid, entries * self.size(array), Contents::Results(self, array))
         };
-        let stored = Stored::RESULTS.into_iter().filter(|array| self.shape.has(array.ends().unwrap_or(*array)));
+        let stored = RESULTS.into_iter().filter(|array| self.shape.has(array.ends().unwrap_or(*array)));
         let mut tensors: Vec<_> = stored.map(tensor).collect();
         tensors.extend(surface_tensors(heading.grid, surface).into_iter().map(|tensor| tensor.map(Contents::Held)));
         write_file(output, heading, tensors)

@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! u64 first point, u64 points, u64 contacts of the object's nodes, u64 touches of the proxy's
-//! the columns, in the order of `Stored::RESULTS`; those of offsets hold the end of each point's row within the block
+//! the columns, in the order of `RESULTS`; those of offsets hold the end of each point's row within the block
 //! ```
 
 use crate::JointMatrix;
 use crate::contact::{Equilibrium, NodeForce, Status};
-use crate::dataset::{Axes, Stored};
+use crate::dataset::{Axes, RESULTS, Stored};
 use bytemuck::Pod;
 use std::collections::{BTreeMap, TryReserveError};
 
@@ -71,7 +71,7 @@ impl Width {
 }
 
 /// Number of columns.
-pub(super) const COLUMNS: usize = Stored::RESULTS.len();
+pub(super) const COLUMNS: usize = RESULTS.len();
 
 /// Results of consecutive grid points. Field by field as in [`crate::dataset::Dataset`].
 #[derive(Default)]
@@ -175,7 +175,7 @@ impl Opening {
     /// Lengths of the columns behind it (bytes).
     fn lengths(self, width: Width) -> [usize; COLUMNS] {
         let Self { points, contacts, touches, .. } = self;
-        Stored::RESULTS.map(|array| {
+        RESULTS.map(|array| {
             let entries = match array.ends() {
                 None => points,
                 Some(Stored::ContactOffsets) => contacts,
@@ -232,7 +232,7 @@ impl<T: Pod> Numbers for Vec<T> {
 }
 
 impl Columns {
-    /// The columns as bytes, in the order of [`Stored::RESULTS`].
+    /// The columns as bytes, in the order of [`RESULTS`].
     pub fn bytes(&self) -> [&[u8]; COLUMNS] {
         let Self { contacts, touches, .. } = self;
         [
@@ -270,7 +270,7 @@ impl Columns {
             &mut touches.nodes,
             &mut touches.forces,
         ];
-        let mut arrays = Stored::RESULTS.into_iter();
+        let mut arrays = RESULTS.into_iter();
         columns.map(|column| (arrays.next().unwrap_or(Stored::Status), column))
     }
 
@@ -391,7 +391,7 @@ impl Columns {
     }
 
     fn of_points_as_bytes(&self) -> impl Iterator<Item = &[u8]> {
-        let columns = Stored::RESULTS.into_iter().zip(self.bytes());
+        let columns = RESULTS.into_iter().zip(self.bytes());
         columns.filter(|(array, _)| !matches!(array.description().axes, Axes::Own(_))).map(|(_, bytes)| bytes)
     }
 

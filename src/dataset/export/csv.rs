@@ -41,8 +41,7 @@ fn write_points(dataset: &Dataset, writer: &mut impl Write) -> io::Result<()> {
     let grid = &dataset.grid;
     // Columns of one number a point.
     let one = |array: &Stored| matches!(array.description().axes, Axes::Grid);
-    let columns: Vec<_> =
-        Stored::ALL.into_iter().filter(one).filter_map(|array| Some((array, dataset.stored(array)?))).collect();
+    let columns: Vec<_> = Stored::all().filter(one).filter_map(|array| Some((array, dataset.stored(array)?))).collect();
     let mut table = Table::new(writer);
     table.fields(grid.axes.iter().map(|axis| quoted(&format!("{} [{}]", axis.name, axis.unit))))?;
     table.fields(grid.axes.iter().map(effort))?;
