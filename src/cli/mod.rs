@@ -54,7 +54,6 @@ mod refine;
 mod scan;
 mod shard;
 mod shell;
-mod stability;
 mod view;
 mod watch;
 
@@ -132,8 +131,6 @@ enum Command {
     Reach(reach::Arguments),
     /// Measure a real object by touching it with a rig (the rig that ships is simulated).
     Scan(scan::Arguments),
-    /// Run the stress tests of every module and compare the worst value of each measure with its limit.
-    Stability(stability::Arguments),
     /// Open a dataset or a scene in a window.
     View(view::Arguments),
 }
@@ -159,7 +156,6 @@ impl Command {
             Self::Play(arguments) => play::run(arguments),
             Self::Reach(arguments) => reach::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
-            Self::Stability(arguments) => stability::run(arguments),
             Self::View(arguments) => view::run(arguments),
         }
     }

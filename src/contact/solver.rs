@@ -91,7 +91,7 @@ impl<'a> Solver<'a> {
     /// The same by the energy form, from where `forces` on the object's nodes hold it, with the scene's tolerance and
     /// iterations.
     #[must_use]
-    pub(crate) fn solve_from(&mut self, q: &[f64], forces: &[NodeForce]) -> Equilibrium {
+    pub fn solve_from(&mut self, q: &[f64], forces: &[NodeForce]) -> Equilibrium {
         let limits =
             StoppingCriteria { tolerance: self.model.contact.tolerance, iterations: self.model.contact.max_iterations };
         self.solve_with_guess(q, forces, self.model.kc, limits)

@@ -1,4 +1,3 @@
-//! Studies of the engine itself: what accuracy costs in time, and whether hard cases stay stable.
+//! Studies of the engine itself: what accuracy costs in time.
 
 pub mod accuracy;
-pub mod stability;

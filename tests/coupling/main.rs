@@ -7,5 +7,4 @@ mod block;
 mod channels;
 mod effects;
 mod passivity;
-mod stability;
 mod trace;

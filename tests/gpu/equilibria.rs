@@ -530,21 +530,6 @@ fn updates_are_refused() {
     assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
 }
 
-/// Every hard case of contact that the CPU keeps: stiffness, exact places and awkward ones, slivers, units, a kilometre
-/// from the origin, torque along paths and against the energy, singular arms; not the search for lower equilibria,
-/// which is the CPU's alone.
-#[test]
-fn the_gpu_keeps_the_bounds_of_its_hard_cases() {
-    use haptize::studies::stability::{CaseResult, Effort, Setting, cases, table};
-    let setting = Setting { effort: Effort::Sample, gpu: Some(context()) };
-    for case in cases().into_iter().filter(|case| case.room == "contact" && case.name != "lowest equilibrium") {
-        let outcomes = (case.run)(&setting).unwrap();
-        let on_gpu: Vec<CaseResult> = outcomes.into_iter().filter(|outcome| outcome.varied.contains("GPU")).collect();
-        assert!(!on_gpu.is_empty(), "{}", case.name);
-        assert!(on_gpu.iter().all(CaseResult::passed), "{}", table(&on_gpu));
-    }
-}
-
 /// The scene's tolerance is what accuracy costs on the GPU too: the rougher it is the fewer steps are taken, in f32 and
 /// f64.
 #[test]

@@ -118,16 +118,9 @@ fn nothing_is_written_to_devices_and_pipes() {
         irregular(home.path(), name);
     }
     std::fs::create_dir(home.path().join("o")).unwrap();
-    for name in [
-        "cspace.png",
-        "gridized.svg",
-        "stability.md",
-        "accuracy.csv",
-        "table.json",
-        "sponge.csv",
-        "out.contacts.csv",
-        "haptize.1",
-    ] {
+    for name in
+        ["cspace.png", "gridized.svg", "accuracy.csv", "table.json", "sponge.csv", "out.contacts.csv", "haptize.1"]
+    {
         irregular(&home.path().join("o"), name);
     }
     std::fs::write(home.path().join("t.csv"), "a,b\n1,2\n").unwrap();
@@ -143,7 +136,6 @@ fn nothing_is_written_to_devices_and_pipes() {
         &["play", "x.haptize", "--seconds", "0.1", "--record", "device"],
         &["play", "x.haptize", "--seconds", "0.1", "-o", "o"],
         &["accuracy", "scene.toml", "-o", "o"],
-        &["stability", "gridization", "--no-gpu", "-o", "o"],
         &["paper", "-o", "o"],
         &["man", "-o", "o"],
         &["scan", "sponge.toml", "--plan-out", "device"],
@@ -188,8 +180,7 @@ fn a_folder_holds_the_files_of_one_run_and_it_is_told_what_was_replaced() {
     refused(home.path(), &["play", "x.haptize", "--record", "o/../o/trace.csv", "-o", "o"], "into the folder, too");
     refused(home.path(), &["play", "x.haptize", "--record", "new/motion.svg", "-o", "new"], "cannot be written");
     for again in [
-        &["stability", "gridization", "--no-gpu", "-o", "s"][..],
-        &["man", "-o", "m"],
+        &["man", "-o", "m"][..],
         &["accuracy", "scene.toml", "--points", "16", "--configurations", "8", "--rounds", "1", "--effects", "-o", "a"],
     ] {
         let first = run(home.path(), again).1;
@@ -234,7 +225,6 @@ fn a_place_that_cannot_be_written_is_told_before_the_work() {
         &["play", "x.haptize", "--seconds", "3000", "--realtime", "--record", "none/r.csv"],
         &["play", "x.haptize", "--seconds", "3000", "--realtime", "-o", "file/o"],
         &["accuracy", "scene.toml", "-o", "file/o"],
-        &["stability", "--full", "--no-gpu", "-o", "file/o"],
         &["view", "x.haptize", "--screenshot", "none/x.png"],
     ] {
         refused(home.path(), arguments, "cannot be written");

@@ -68,7 +68,6 @@ fn every_command_ends_within_a_second_of_a_signal() {
         (&["bake", "long.toml", "--max-error", "0.01%", "--refine", "3", "-o", "fine.haptize"], 130),
         (&["inspect", "slow.toml", "--q=0,0.01"], 130),
         (&["accuracy", "slow.toml", "-o", "a"], 130),
-        (&["stability", "--full", "--no-gpu", "-o", "s"], 130),
         (&["play", "x.haptize", "--realtime", "--seconds", "60", "-o", "p"], 130),
     ] {
         for signal in listened() {

@@ -194,7 +194,6 @@ const REFUSED: &[&[&str]] = &[
     &["play", "x.haptize", "--device", "touch", "--seconds", "0.1"],
     &["play", "x.haptize", "--replay", "bytes"],
     &["scan", "sponge.toml", "-o", "full.toml"],
-    &["stability", "none"],
     &["view", "x.haptize", "--screenshot", "x.png"],
     &["view", "none.toml", "--screenshot", "x.png"],
 ];
@@ -218,7 +217,6 @@ fn every_option_that_a_message_names_is_one_of_its_command() {
         "paper",
         "play",
         "scan",
-        "stability",
         "view",
     ];
     let told = |name: &str| succeed(home.path(), &[name, "--help"]);

@@ -6,19 +6,19 @@
 //! independent search starts from forces that have nothing to do with the rest state: those that hold neighbours on the
 //! grid, weaker and stronger ones, and those of configurations elsewhere.
 
-use super::super::{Bound, CaseResult, Effort, Failure, Setting};
-use crate::{
+use crate::{Bound, CaseResult, Effort, Failure, Setting};
+use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status},
+    fixtures::Random,
     object::Object,
     proxy::Chain,
-    random::Random,
     scene::Scene,
     sweep::Sweep,
 };
 use rayon::prelude::*;
 
-const SPHERE: &str = include_str!("../../../../datasets/sphere.toml");
+const SPHERE: &str = include_str!("../../../datasets/sphere.toml");
 
 /// Configurations between two points of the grid.
 const FINE: usize = 256;

@@ -9,10 +9,9 @@ mod processor;
 mod stiffness;
 mod units;
 
-use super::Case;
+use crate::Case;
 
 /// All of them.
-#[must_use]
 pub fn cases() -> Vec<Case> {
     let case = |name, run| Case { room: "contact", name, run };
     vec![
@@ -30,15 +29,4 @@ pub fn cases() -> Vec<Case> {
         case("lowest equilibrium", equilibria::run),
         case("singular arms", kinematics::run),
     ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// On the CPU; the GPU's half is in `tests/gpu`.
-    #[test]
-    fn a_sample_of_every_case_keeps_its_bounds() {
-        super::super::assert_samples_keep_their_bounds(cases());
-    }
 }

@@ -4,10 +4,10 @@
 //! where it jumps it does not. Balls see the surface round. A point that lies inside changes facets at the planes that
 //! bisect convex edges, where its normal turns at once: its tau jumps there, by no more than facets turn.
 
-use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
-use crate::fixtures::bodies::{BALL, PAPER, RADIUS, contact_of, floating_bar, pressed, sphere};
-use crate::{
+use crate::{Bound, CaseResult, Effort, Failure, Setting};
+use haptize::fixtures::bodies::{BALL, PAPER, RADIUS, contact_of, floating_bar, pressed, sphere};
+use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Status},
 };

@@ -3,7 +3,7 @@
 use super::{
     Altered, Bound, CaseResult, DESKTOP, Failure, Setting, Watch, drive, noise, on_time, open, presses, seconds,
 };
-use crate::{
+use haptize::{
     device::Reading,
     render::{flags::Fault, haptic::GREATEST_GIVEN_ENERGY},
 };

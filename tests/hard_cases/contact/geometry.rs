@@ -1,16 +1,18 @@
 //! Exact places and awkward arrangements: nodes on faces, edges and vertices to the last bit, on each other, in the
 //! middle of the object, right through it, in hollows, and on two sides at once.
 
-use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::{Processor, processors};
-use crate::fixtures::bodies::{BALL, PAPER, RADIUS, contact_of, floating_bar, gantry, pressed, skinned, sphere, torus};
-use crate::{
+use crate::{Bound, CaseResult, Effort, Failure, Setting};
+use glam::DVec3;
+use haptize::fixtures::bodies::{
+    BALL, PAPER, RADIUS, contact_of, floating_bar, gantry, pressed, skinned, sphere, torus,
+};
+use haptize::{
     JointVector,
     contact::{Model, Status},
     object::Object,
     scene::ProxyNodeSpec,
 };
-use glam::DVec3;
 
 /// Contact stiffnesses at which the arrangements are tried (N/m).
 const STIFFNESSES: [f64; 3] = [1e2, 1e4, f64::INFINITY];

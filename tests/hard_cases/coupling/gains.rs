@@ -1,7 +1,7 @@
 //! Gains at their bounds and far beyond, with and without what takes the energy that they create.
 
 use super::{Bound, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, presses, seconds, way};
-use crate::{
+use haptize::{
     fixtures::worlds::block,
     render::{
         haptic::GREATEST_GIVEN_ENERGY,

@@ -1,7 +1,7 @@
 //! Devices that lie: they leap, report no numbers, or see the hand in coarse steps.
 
 use super::{Altered, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, presses, seconds};
-use crate::{device::Reading, render::flags::Fault};
+use haptize::{device::Reading, render::flags::Fault};
 
 /// `reading` with each joint's position changed.
 fn moved(reading: Reading, change: impl Fn(f64) -> f64) -> Reading {

@@ -1,7 +1,7 @@
 //! Places where the dataset or the arm fails: cells absent or unconverged, configurations that are singular.
 
 use super::{CaseResult, DESKTOP, Failure, Setting, Watch, noise, on_time, open, presses, seconds, way};
-use crate::{contact::Status, dataset::Dataset, fixtures::worlds::half_space, render::setup::Setup};
+use haptize::{contact::Status, dataset::Dataset, fixtures::worlds::half_space, render::setup::Setup};
 
 pub(super) fn bad_cells(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let seconds = seconds(setting, 2.0, 60.0);

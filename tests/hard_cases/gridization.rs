@@ -3,8 +3,8 @@
 //! A torque linear in q is reproduced exactly by linear interpolation on any triangulation, so that its error shows
 //! every sliver, inverted simplex and lost point. Its size is judged relative to the greatest torque.
 
-use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
-use crate::{
+use crate::{Bound, Case, CaseResult, Effort, Failure, Setting};
+use haptize::{
     contact::Status,
     dataset::{Dataset, JointLabel},
     gridize::{GridizeOptions, Interpolation, Samples, gridize},
@@ -17,7 +17,6 @@ use std::f64::consts::{PI, TAU};
 const GRIDIZED_LINEAR: f64 = 1e-9;
 
 /// The cases of this file.
-#[must_use]
 pub fn cases() -> Vec<Case> {
     let case = |name, run| Case { room: "gridization", name, run };
     vec![
@@ -247,14 +246,4 @@ fn refused(_: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let varied = "NaN, flat, too few, steps that are none";
     let note = format!("of {}", hostile.len());
     Ok(vec![outcome("input to be refused", varied, "accepted", accepted as f64, Bound::AtMost(0.0), note)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_sample_of_every_case_keeps_its_bounds() {
-        super::super::assert_samples_keep_their_bounds(cases());
-    }
 }

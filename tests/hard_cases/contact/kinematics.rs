@@ -1,16 +1,16 @@
 //! Arms in singular postures, at their limits, with axes that coincide: contact sees where the nodes are and nothing
 //! else.
 
-use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
-use crate::fixtures::bodies::{PAPER, contact, joint, sphere};
-use crate::{
+use crate::{Bound, CaseResult, Failure, Setting};
+use glam::DVec3;
+use haptize::fixtures::bodies::{PAPER, contact, joint, sphere};
+use haptize::{
     JointVector,
     contact::Model,
     proxy::Chain,
     scene::{JointKind, JointSpec, ProxyNodeSpec, ProxySpec},
 };
-use glam::DVec3;
 
 /// Where the base stands (m): its links reach the sphere stretched out, a little off the plane in which its edges lie.
 const BASE: DVec3 = DVec3::new(-0.2, 0.003, 0.04);

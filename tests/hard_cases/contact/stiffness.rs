@@ -3,10 +3,10 @@
 //! E never rises and no number breaks. Beside it the same on the GPU, of the fine surface a tenth, and a tenth of all
 //! by the paper's iteration.
 
-use super::super::{Bound, CaseResult, Effort, Failure, Setting};
 use super::processor::Processor;
-use crate::fixtures::bodies::{BALL, Ball, RADIUS, contact, contact_of, floating_bar, pressed, skinned, sphere};
-use crate::{
+use crate::{Bound, CaseResult, Effort, Failure, Setting};
+use haptize::fixtures::bodies::{BALL, Ball, RADIUS, contact, contact_of, floating_bar, pressed, skinned, sphere};
+use haptize::{
     JointVector,
     contact::{Model, Solver, Status},
     gpu::{Context, GpuError},
@@ -122,16 +122,14 @@ pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
             gpu += cell.gpu;
             too_large += cell.gpu_too_large;
         }
-        if setting.gpu.is_some() {
-            outcomes.push(CaseResult {
-                case: "stiffness".into(),
-                varied: format!("all of these, on the GPU, depth {from} to {to} R"),
-                measure: "share converged [1]".into(),
-                worst: gpu.part(),
-                bound: Bound::AtLeast(least),
-                note: format!("{} solved, {too_large} combinations too large for the adapter", gpu.solved),
-            });
-        }
+        outcomes.push(CaseResult {
+            case: "stiffness".into(),
+            varied: format!("all of these, on the GPU, depth {from} to {to} R"),
+            measure: "share converged [1]".into(),
+            worst: gpu.part(),
+            bound: Bound::AtLeast(least),
+            note: format!("{} solved, {too_large} combinations too large for the adapter", gpu.solved),
+        });
     }
     let figure = |varied: &str, measure: &str, worst: f64, bound: f64| CaseResult {
         case: "stiffness".into(),
@@ -151,11 +149,8 @@ pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
             Processor::cpu().residual(),
         )
     });
-    if let Some(context) = &setting.gpu {
-        let bound = Processor::gpu(context).residual();
-        let measure = "residual of what is called converged [1]";
-        outcomes.push(figure("all, on the GPU", measure, worst.gpu_residual, bound));
-    }
+    let (measure, bound) = ("residual of what is called converged [1]", Processor::gpu(&setting.gpu).residual());
+    outcomes.push(figure("all, on the GPU", measure, worst.gpu_residual, bound));
     outcomes.push(figure("all of these", "rise of E in a step, relative [1]", worst.rise, 1e-12));
     outcomes.push(figure("all of these", "results with numbers that are not finite", worst.broken as f64, 0.0));
     Ok(outcomes)
@@ -250,16 +245,14 @@ fn combination(
                     cell.least = Some((share, name.clone()));
                 }
                 cell.paper += tenth(&paper, &configurations);
-                if let Some(context) = &setting.gpu {
-                    // A software rasteriser takes a hundred times the CPU's time.
-                    let every = match setting.effort {
-                        Effort::Sample => 4,
-                        Effort::Full if object.surface_nodes > 1000 => 10,
-                        Effort::Full => 1,
-                    };
-                    let some: Vec<JointVector> = configurations.iter().step_by(every).copied().collect();
-                    on_gpu(context, &model, &some, cell, worst)?;
-                }
+                // A software rasteriser takes a hundred times the CPU's time.
+                let every = match setting.effort {
+                    Effort::Sample => 4,
+                    Effort::Full if object.surface_nodes > 1000 => 10,
+                    Effort::Full => 1,
+                };
+                let some: Vec<JointVector> = configurations.iter().step_by(every).copied().collect();
+                on_gpu(&setting.gpu, &model, &some, cell, worst)?;
             }
         }
     }

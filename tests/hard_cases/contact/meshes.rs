@@ -1,17 +1,17 @@
 //! Broken surfaces: repaired with a warning that says what was done, and then of the same torque as the sound one; or
 //! refused with the reason. Slivers are sound, and their torque is that of the stored energy.
 
-use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
-use crate::fixtures::bodies::{PAPER, RADIUS, contact, joint, probe, sphere, sphere_spec};
-use crate::{
+use crate::{Bound, CaseResult, Failure, Setting};
+use glam::DVec3;
+use haptize::fixtures::bodies::{PAPER, RADIUS, contact, joint, probe, sphere, sphere_spec};
+use haptize::{
     JointVector,
     contact::{Model, Solver, Status},
     object::{Object, ObjectError, SurfaceDefect},
     proxy::Chain,
     scene::{JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape},
 };
-use glam::DVec3;
 use std::{fmt::Write, path::Path};
 
 /// A surface in the making.
@@ -194,7 +194,7 @@ fn slivers(mut processor: Processor<'_>) -> Result<CaseResult, Failure> {
             }
         }
     }
-    let object = crate::fixtures::bodies::object(nodes, triangles)?;
+    let object = haptize::fixtures::bodies::object(nodes, triangles)?;
     let mut worst = 0.0f64;
     let mut unconverged = 0;
     let mut tried = 0;

@@ -1,7 +1,7 @@
-//! Who solves a case's configurations: the CPU, and the GPU where there is one.
+//! Who solves a case's configurations: the CPU, and the GPU.
 
-use super::super::Setting;
-use crate::{
+use crate::Setting;
+use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver},
     gpu::{Context, GpuError, GpuSolver},
@@ -21,7 +21,7 @@ pub struct Processor<'a> {
 /// The CPU, and the GPU of `setting`.
 pub fn processors(setting: &Setting) -> Vec<Processor<'_>> {
     let mut processors = vec![Processor::cpu()];
-    processors.extend(setting.gpu.as_ref().map(Processor::gpu));
+    processors.push(Processor::gpu(&setting.gpu));
     processors
 }
 

@@ -1,16 +1,16 @@
 //! Units and places of the world that must not matter: lengths in millimetres, an object a kilometre from the origin.
 
-use super::super::{Bound, CaseResult, Failure, Setting};
 use super::processor::{Processor, processors};
-use crate::fixtures::bodies::{PAPER, RADIUS, contact, floating_bar, joint, pressed, sphere, sphere_spec};
-use crate::{
+use crate::{Bound, CaseResult, Failure, Setting};
+use glam::DVec3;
+use haptize::fixtures::bodies::{PAPER, RADIUS, contact, floating_bar, joint, pressed, sphere, sphere_spec};
+use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Status},
     object::Object,
     proxy::Chain,
     scene::{JointKind, ProxyNodeSpec, ProxySpec},
 };
-use glam::DVec3;
 
 /// Depths of the configurations (m).
 const DEPTH: f64 = 0.2 * RADIUS;
@@ -109,11 +109,11 @@ pub fn far_away(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
         }
         let (case, measure) = ("far from the origin", "U and tau against those at it, relative [1]");
         let expected = Processor::cpu().solve(&models[0], &configurations)?;
-        let mut trials = vec![("1 km away", &models[1], Processor::cpu())];
-        if let Some(context) = &setting.gpu {
-            trials.push(("at the origin", &models[0], Processor::gpu(context)));
-            trials.push(("1 km away", &models[1], Processor::gpu(context)));
-        }
+        let trials = [
+            ("1 km away", &models[1], Processor::cpu()),
+            ("at the origin", &models[0], Processor::gpu(&setting.gpu)),
+            ("1 km away", &models[1], Processor::gpu(&setting.gpu)),
+        ];
         for (place, model, mut processor) in trials {
             let found = processor.solve(model, &configurations)?;
             let worst = difference(&expected, &found, 1.0, |_| 1.0);

@@ -1,7 +1,7 @@
 //! Long hours: ten simulated minutes at rest, and as long dragged along in jerks.
 
 use super::{Bound, CaseResult, DESKTOP, Failure, Setting, Watch, on_time, open, seconds, way};
-use crate::{
+use haptize::{
     JointVector,
     device::{Device, Motion},
     fixtures::worlds::block,

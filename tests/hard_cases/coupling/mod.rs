@@ -11,9 +11,9 @@ mod gains;
 mod places;
 mod time;
 
-use super::{Bound, Case, CaseResult, Effort, Failure, Setting};
-use crate::fixtures::worlds::half_space;
-use crate::{
+use crate::{Bound, Case, CaseResult, Effort, Failure, Setting};
+use haptize::fixtures::worlds::half_space;
+use haptize::{
     JointVector,
     device::{Applied, Device, Motion, Reading, SimulatedHand},
     render::{
