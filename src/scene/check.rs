@@ -2,12 +2,17 @@
 
 use super::error::{Diagnostic, SceneError};
 use super::file::{Number, PerJoint, Vector};
-use super::{JointKind, JointSpec};
+use super::value::KEY;
+use super::{JointKind, JointSpec, ProxySpec};
 use crate::JointVector;
 use glam::DVec3;
+use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::Path;
-use toml::Spanned;
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue},
+};
 
 /// Largest size of any number: far beyond every physical quantity in SI units that a scene may hold, and its powers
 /// that the engine forms are still finite.
@@ -23,6 +28,88 @@ impl Checker<'_> {
     /// An error at `span`.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> SceneError {
         Diagnostic::new(self.path, self.text, span, message).into()
+    }
+
+    /// Reads the text.
+    ///
+    /// # Errors
+    /// At the value that cannot be read.
+    pub fn read<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
+        toml::from_str(self.text).map_err(|error| {
+            let span = error.span().unwrap_or(0..0);
+            let message = match error.message().strip_prefix(KEY) {
+                Some(rest) => {
+                    let root = DeTable::parse(self.text).ok();
+                    let key = root.as_ref().and_then(|root| key_at(root.get_ref(), span.start));
+                    format!("{} {rest}", key.unwrap_or("the value"))
+                }
+                None => error.message().to_owned(),
+            };
+            self.error(span, message)
+        })
+    }
+
+    /// An error at what `path` names, keys and numbers of entries with dots between, or at the table around it that the
+    /// text has.
+    pub fn at(&self, path: &str, message: impl Into<String>) -> SceneError {
+        self.error(self.place(path), message)
+    }
+
+    fn place(&self, path: &str) -> Range<usize> {
+        let Ok(root) = DeTable::parse(self.text) else { return 0..0 };
+        let mut place = 0..0;
+        let root = DeValue::Table(root.into_inner());
+        let mut value = &root;
+        for part in path.split('.') {
+            let inner = part.parse::<usize>().map_or_else(|_| value.get(part), |number| value.get(number));
+            let Some(inner) = inner else { break };
+            (place, value) = (inner.span(), inner.get_ref());
+        }
+        place
+    }
+
+    /// Checks that the arm has a contact node of the number that stands at `path`.
+    pub fn node(&self, path: &str, node: Option<usize>, proxy: &ProxySpec) -> Result<(), SceneError> {
+        let nodes: usize = proxy.joints.iter().map(|joint| joint.nodes.len()).sum();
+        match node {
+            Some(node) if node >= nodes => {
+                Err(self
+                    .at(path, format!("node is {node}: it must be less than {nodes}, the contact nodes of the arm")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Brings `list`, which stands at `path` in the text, to one number per joint: one number is that of all joints, and
+    /// where the text has none, `default` tells it by the kind of joint. Where the chain mixes kinds of joint, a single
+    /// number has no one unit and is refused.
+    pub fn fit(
+        &self,
+        path: &str,
+        list: &mut JointVector,
+        joints: &[JointSpec],
+        default: impl Fn(JointKind) -> f64,
+    ) -> Result<(), SceneError> {
+        let key = path.rsplit('.').next().unwrap_or(path);
+        let (found, needed) = (list.len(), joints.len());
+        let mut fitted = JointVector::zeros(needed);
+        if found == 0 {
+            fitted.iter_mut().zip(joints).for_each(|(entry, joint)| *entry = default(joint.kind));
+        } else if found == needed {
+            return Ok(());
+        } else if found > 1 || self.text[self.place(path)].starts_with('[') {
+            return Err(self.at(path, format!("{key} lists {found} numbers for {needed} joints")));
+        } else if joints.iter().any(|joint| joint.kind != joints[0].kind) {
+            let message = format!(
+                "{key} needs a list of {needed} numbers, one per joint: its unit differs between revolute and \
+                 prismatic joints"
+            );
+            return Err(self.at(path, message));
+        } else {
+            fitted.fill(list[0]);
+        }
+        *list = fitted;
+        Ok(())
     }
 
     /// A number in the range that `allowed` accepts and `range` puts in words.
@@ -133,4 +220,16 @@ impl Checker<'_> {
         }
         Ok(vector)
     }
+}
+
+/// The key in `table` of the value at a byte of the text.
+fn key_at<'a>(table: &'a DeTable<'_>, at: usize) -> Option<&'a str> {
+    table.iter().find_map(|(key, value)| {
+        let inside = match value.get_ref() {
+            DeValue::Table(inner) => return key_at(inner, at),
+            DeValue::Array(list) => list.iter().find_map(|entry| key_at(entry.get_ref().as_table()?, at)),
+            _ => None,
+        };
+        inside.or_else(|| value.span().contains(&at).then_some(key.get_ref().as_ref()))
+    })
 }

@@ -3,9 +3,12 @@
 //! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see
 //! [`super::convert`].
 
-use super::{Algorithm, ContactSurface, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
+use super::graphics::GraphicsEntry;
+use super::grid::GridTable;
+use super::scan::ScanTable;
+use super::{Algorithm, ContactSurface, DeviceSpec, Interpolation, JointKind, MotionSpec, ProxyInertia, SpringKind};
 use serde::Deserialize;
-use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
+use serde::de::{Deserializer, SeqAccess, Visitor};
 use toml::Spanned;
 
 pub(super) type Number = Spanned<f64>;
@@ -18,26 +21,15 @@ pub(super) struct SceneTable {
     pub object: Option<Spanned<ObjectTable>>,
     pub proxy: ProxyTable,
     pub contact: Option<Spanned<ContactTable>>,
-    pub grid: Option<Spanned<GridTable>>,
-    pub scan: Option<Spanned<ScanTable>>,
+    pub grid: Option<GridTable>,
+    pub scan: Option<ScanTable>,
     #[serde(default)]
     pub haptics: HapticsTable,
     pub graphics: Option<GraphicsEntry>,
     #[serde(default)]
-    pub motion: MotionTable,
+    pub motion: MotionSpec,
     #[serde(default)]
-    pub device: DeviceTable,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct DeviceTable {
-    pub map: Option<Spanned<Vec<Vec<f64>>>>,
-    pub offset: Option<Spanned<Vec<f64>>>,
-    pub node: Option<Spanned<usize>>,
-    pub stiffness: Option<Number>,
-    pub damping: Option<Number>,
-    pub effort_limit: Option<Spanned<Vec<f64>>>,
+    pub device: DeviceSpec,
 }
 
 #[derive(Deserialize)]
@@ -206,22 +198,6 @@ pub(super) struct ContactTable {
     pub surface: Option<Spanned<ContactSurface>>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GridTable {
-    pub spacing: Option<Number>,
-    pub axes: Option<Spanned<Vec<Spanned<AxisTable>>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct AxisTable {
-    pub start: Option<Number>,
-    pub stop: Option<Number>,
-    pub step: Option<Number>,
-    pub count: Option<Spanned<usize>>,
-}
-
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct HapticsTable {
@@ -271,136 +247,6 @@ pub(super) struct HandTable {
     pub stiffness: Option<Spanned<PerJoint>>,
     pub damping: Option<Spanned<PerJoint>>,
     pub inertia: Option<Spanned<PerJoint>>,
-}
-
-/// The graphics loop, or `false` for none.
-pub(super) enum GraphicsEntry {
-    Off,
-    Loop(Box<GraphicsTable>),
-}
-
-impl<'de> Deserialize<'de> for GraphicsEntry {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct FalseOrTable;
-
-        impl<'de> Visitor<'de> for FalseOrTable {
-            type Value = GraphicsEntry;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("the table [graphics], or false")
-            }
-
-            fn visit_bool<E: serde::de::Error>(self, value: bool) -> Result<GraphicsEntry, E> {
-                if value {
-                    return Err(E::invalid_value(serde::de::Unexpected::Bool(true), &self));
-                }
-                Ok(GraphicsEntry::Off)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<GraphicsEntry, A::Error> {
-                GraphicsTable::deserialize(MapAccessDeserializer::new(map))
-                    .map(|table| GraphicsEntry::Loop(Box::new(table)))
-            }
-        }
-
-        deserializer.deserialize_any(FalseOrTable)
-    }
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GraphicsTable {
-    pub rate: Option<Number>,
-    pub gravity: Option<Vector>,
-    pub stiffening: Option<Spanned<StiffeningTable>>,
-    pub smoothing: Option<Number>,
-    pub quasi_static: Option<Spanned<bool>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct StiffeningTable {
-    pub factor: Number,
-    pub strain: Number,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct MotionTable {
-    pub press: Option<Spanned<Vec<WaypointTable>>>,
-    pub scrape: Option<Spanned<Vec<WaypointTable>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct WaypointTable {
-    pub time: Number,
-    pub q: Spanned<Vec<f64>>,
-}
-
-/// Haptization of a real object.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ScanTable {
-    pub workspace: Option<WorkspaceTable>,
-    pub joints: Option<Spanned<GridTable>>,
-    #[serde(default)]
-    pub control: ControlTable,
-    pub limits: LimitsTable,
-    pub simulated: SimulatedTable,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct WorkspaceTable {
-    pub node: Option<Spanned<usize>>,
-    pub start: Vector,
-    pub across: Spanned<Vec<PlanAxisTable>>,
-    pub depth: PlanAxisTable,
-    pub clearance: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct PlanAxisTable {
-    pub direction: Vector,
-    pub spacing: Number,
-    pub count: Spanned<usize>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ControlTable {
-    pub rate: Option<Number>,
-    pub stiffness: Option<Spanned<PerJoint>>,
-    pub damping: Option<Spanned<PerJoint>>,
-    pub speed: Option<Number>,
-    pub window: Option<Number>,
-    pub still: Option<Number>,
-    pub drift: Option<Number>,
-    pub timeout: Option<Number>,
-    pub average: Option<Number>,
-    pub epsilon: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LimitsTable {
-    pub torque: Option<Spanned<PerJoint>>,
-    pub speed: Option<Number>,
-    pub workspace: Spanned<[[f64; 3]; 2]>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SimulatedTable {
-    pub corner: Vector,
-    pub size: Vector,
-    pub cover: Option<Cover>,
-    pub friction: Option<Number>,
-    pub encoder: Option<Number>,
-    pub noise: Option<Number>,
-    pub joint_friction: Option<Number>,
 }
 
 /// A number, or one word instead.

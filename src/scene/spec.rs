@@ -348,31 +348,6 @@ impl Algorithm {
     }
 }
 
-/// The uniform grid over C-space.
-#[derive(Clone, Debug, PartialEq)]
-pub struct GridSpec {
-    /// One per joint, in the chain's order; none where the scene leaves the grid out.
-    pub axes: Vec<AxisSpec>,
-}
-
-/// Grid coordinates `start + k step`, `k < count`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisSpec {
-    /// (rad or m)
-    pub start: f64,
-    /// Positive (rad or m).
-    pub step: f64,
-    /// At least 2.
-    pub count: usize,
-}
-
-/// How far beyond an end a grid line may lie and still count, in steps (1): spacings such as pi/60 are written with a
-/// handful of digits, and 1e-6 of a step changes no torque that is interpolated between lines.
-pub const GRID_STEP_SLACK: f64 = 1e-6;
-
-/// A grid line this fraction of a step outside the samples' range still lies on its end.
-pub const GRID_LINE: f64 = 1e-9;
-
 /// Threshold Ith of the contact index unless the scene names one (1): the paper's.
 pub const THRESHOLD: f64 = 0.5;
 
@@ -530,68 +505,4 @@ pub struct HandSpec {
     pub damping: JointVector,
     /// Inertia of the hand itself, moving with the device (kg m^2).
     pub inertia: JointVector,
-}
-
-/// The graphics loop (section 3.2).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GraphicsSpec {
-    /// Frames per second (Hz).
-    pub rate: f64,
-    /// Effects beyond the paper's.
-    pub effects: GraphicsEffects,
-}
-
-/// Effects of the graphics loop: each absent unless the scene names it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GraphicsEffects {
-    /// Acceleration of gravity on the object's nodes (m/s^2).
-    pub gravity: Option<DVec3>,
-    /// Springs stiffen with strain.
-    pub stiffening: Option<StiffeningSpec>,
-    /// Time constant of a low-pass filter on the contact forces that move the object (s).
-    pub smoothing: Option<f64>,
-    /// The object has no dynamics: n = n0 + C f.
-    pub quasi_static: bool,
-}
-
-impl GraphicsEffects {
-    /// The key of the first effect that the scene names.
-    #[must_use]
-    pub fn named(&self) -> Option<&'static str> {
-        [
-            ("gravity", self.gravity.is_some()),
-            ("stiffening", self.stiffening.is_some()),
-            ("smoothing", self.smoothing.is_some()),
-            ("quasi_static", self.quasi_static),
-        ]
-        .into_iter()
-        .find_map(|(key, is_named)| is_named.then_some(key))
-    }
-}
-
-/// How springs stiffen with strain.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StiffeningSpec {
-    /// Stiffness at large strains over that at rest, kappa; more than 1 (1).
-    pub factor: f64,
-    /// Strain around which it rises, eps (1).
-    pub strain: f64,
-}
-
-/// Named motions of the hand, as waypoints in C-space.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MotionSpec {
-    /// Approach, press into the object, release; empty where the scene has none.
-    pub press: Vec<Waypoint>,
-    /// Slide across the object in contact; empty where the scene has none.
-    pub scrape: Vec<Waypoint>,
-}
-
-/// The hand passes `q` at `time`; between waypoints it moves along a smooth (minimum-jerk) path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Waypoint {
-    /// Since the motion began (s).
-    pub time: f64,
-    /// Configuration (rad or m).
-    pub q: JointVector,
 }

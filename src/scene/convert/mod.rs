@@ -1,21 +1,20 @@
 //! From the tables of a scene file to a validated [`Scene`]: defaults filled, every number checked, one file per table.
 
-mod device;
-mod graphics;
-mod grid;
 mod haptics;
-mod motion;
 mod object;
 mod proxy;
-mod scan;
 mod shape;
 mod skin;
 
 use super::check::Checker;
 use super::error::SceneError;
-use super::file::{ContactTable, GraphicsEntry, GraphicsTable, NumberOr, SceneTable};
-use super::{Algorithm, ContactSpec, ContactSurface, GridSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene};
+use super::file::{ContactTable, NumberOr, SceneTable};
+use super::graphics::GraphicsEntry;
+use super::{
+    Algorithm, ContactSpec, ContactSurface, GraphicsSpec, Interpolation, ProxySpec, Rendering, ScanScene, Scene,
+};
 use crate::names;
+use std::mem::take;
 use toml::Spanned;
 
 /// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to 1e-6
@@ -26,60 +25,53 @@ const CONTACT_TOLERANCE: f64 = 1e-8;
 const CONTACT_ITERATIONS: u32 = 400;
 
 /// Validates `table`, read from the checker's text, as a scene with a virtual object.
-pub(super) fn scene(checker: &Checker<'_>, table: &SceneTable) -> Result<Scene, SceneError> {
-    let (Some(object), Some(contact_table)) = (&table.object, &table.contact) else {
+pub(super) fn scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<Scene, SceneError> {
+    let rendering = rendering(checker, &mut table)?;
+    let (Some(object), Some(contact_table)) = (rendering.object, table.contact) else {
         let message = "the scene needs [object] and [contact] to be baked; a scene of a real object, with [scan], is \
                        haptized by `haptize scan`";
         return Err(checker.error(0..0, message));
     };
-    let Rendering { path, text, name, proxy, haptics, graphics, motion, .. } = rendering(checker, table)?;
-    Ok(Scene {
-        path,
-        text,
-        name,
-        object: object::convert(checker, object)?,
-        contact: contact(checker, contact_table, &proxy)?,
-        grid: match &table.grid {
-            Some(grid) => grid::convert(checker, grid, &proxy.joints)?,
-            None => GridSpec { axes: Vec::new() },
-        },
-        haptics,
-        graphics,
-        motion,
-        proxy,
-    })
+    let Rendering { path, text, name, proxy, haptics, graphics, motion, .. } = rendering;
+    let grid = table.grid.map(|grid| grid.check(checker, "grid", &proxy.joints)).transpose()?.unwrap_or_default();
+    let contact = contact(checker, &contact_table, &proxy)?;
+    Ok(Scene { path, text, name, object, contact, grid, haptics, graphics, motion, proxy })
 }
 
 /// Validates `table` as a scene with a real object.
-pub(super) fn scan_scene(checker: &Checker<'_>, table: &SceneTable) -> Result<ScanScene, SceneError> {
-    let Some(scan) = &table.scan else {
+pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<ScanScene, SceneError> {
+    let Some(scan) = table.scan.take() else {
         let message = "the scene has no [scan]: it says nothing of how a real object is haptized; a virtual one is \
                        haptized by `haptize bake`";
         return Err(checker.error(0..0, message));
     };
-    let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, table)?;
+    let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, &mut table)?;
     if let Some((effect, place)) = haptics.effects.at_contacts() {
         let message = format!("{effect} needs the contact forces, which a real object does not tell: leave it out");
         return Err(checker.error(place.clone(), message));
     }
-    Ok(ScanScene { text, name, scan: scan::convert(checker, scan, &proxy)?, device, proxy })
+    Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }
 
-/// Validates what rendering needs of `table`.
-pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Rendering, SceneError> {
+/// Validates what rendering needs of `table`, and takes it.
+pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result<Rendering, SceneError> {
     let proxy = proxy::convert(checker, &table.proxy)?;
     let joints = &proxy.joints;
     let object = table.object.as_ref().map(|object| object::convert(checker, object)).transpose()?;
     // A virtual object is drawn unless the scene says no; a real one moves by no forces that are known.
-    let graphics = match &table.graphics {
-        Some(GraphicsEntry::Loop(own)) => Some(graphics::convert(checker, own, object.as_ref())?),
-        None if object.is_some() => Some(graphics::convert(checker, &GraphicsTable::default(), object.as_ref())?),
-        None | Some(GraphicsEntry::Off) => None,
+    let graphics = match table.graphics {
+        Some(GraphicsEntry::Loop(graphics)) => Some(graphics),
+        None => object.is_some().then(GraphicsSpec::default),
+        Some(GraphicsEntry::Off) => None,
     };
+    graphics.map_or(Ok(()), |graphics| graphics.check(checker, object.as_ref()))?;
     // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
     // energy.
     let solved = table.contact.as_ref().is_some_and(|own| own.get_ref().algorithm != Some(Algorithm::Paper));
     let interpolation = if object.is_some() && solved { Interpolation::Potential } else { Interpolation::Linear };
+    let (motion, device) = (take(&mut table.motion), take(&mut table.device));
+    motion.check(checker, joints)?;
+    device.check(checker, &proxy)?;
     if let Some(name) = &table.name {
         names::check(name.get_ref()).map_err(|why| checker.error(name.span(), why))?;
     }
@@ -91,8 +83,8 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
         object,
         haptics: haptics::convert(checker, &table.haptics, joints, interpolation)?,
         graphics,
-        motion: motion::convert(checker, &table.motion, joints)?,
-        device: device::convert(checker, &table.device, &proxy)?,
+        motion,
+        device,
         shapes: shape::convert(checker, &table.proxy.shape, joints)?,
         proxy,
     })
