@@ -4,7 +4,7 @@
 //! file, the line and the remedy. All quantities are SI: metres, radians, newtons, kilograms, seconds.
 
 mod check;
-mod convert;
+mod contact;
 mod device;
 mod effects;
 mod effort;
@@ -13,15 +13,19 @@ mod file;
 mod gains;
 mod graphics;
 mod grid;
+mod haptics;
 mod inertia;
 mod motion;
+mod object;
 mod own_text;
+mod proxy;
 mod scan;
 mod shape;
-mod spec;
+mod skin;
 pub(crate) mod text;
 mod value;
 
+pub use contact::{Algorithm, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{arm_note, effort_norms, effort_unit, efforts, lever_arm};
@@ -29,15 +33,19 @@ pub use error::{Diagnostic, SceneError};
 pub use gains::GainError;
 pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};
 pub use grid::{AxisSpec, GRID_LINE, GRID_STEP_SLACK, GridSpec};
+pub use haptics::{
+    BOUNDARY_SLOPE, FourChannelSpec, FrictionSpec, GREATEST_INTERVAL, HandSpec, HapticsSpec, Interpolation, LEVER_ARM,
+    ProxyInertia, THRESHOLD,
+};
 pub use motion::{MotionSpec, Waypoint};
+pub use object::{
+    ElasticSpec, GroundNodes, GroundSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape, SpringKind,
+    SpringSpec,
+};
+pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
-pub use spec::{
-    Algorithm, BOUNDARY_SLOPE, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec,
-    FrictionSpec, GREATEST_INTERVAL, GroundNodes, GroundSpec, HandSpec, HapticEffects, HapticsSpec, InclusionPlace,
-    InclusionSpec, Interpolation, JointKind, JointSpec, LEVER_ARM, MAX_CONTACT_NODES, Material, ObjectSpec,
-    ProxyInertia, ProxyNodeSpec, ProxySpec, Shape, SkinSpec, SpringKind, SpringSpec, THRESHOLD,
-};
+pub use skin::SkinSpec;
 
 pub(crate) use inertia::positive_semidefinite;
 
@@ -145,7 +153,7 @@ impl Scene {
     /// When the scene is not valid; the message names the line and the remedy.
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let checker = Checker { path: path.as_ref(), text };
-        convert::scene(&checker, checker.read()?)
+        file::scene(&checker, checker.read()?)
     }
 }
 
@@ -165,7 +173,7 @@ impl ScanScene {
     /// When the scene has no valid `[scan]`; the message names the line and the remedy.
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let checker = Checker { path: path.as_ref(), text };
-        convert::scan_scene(&checker, checker.read()?)
+        file::scan_scene(&checker, checker.read()?)
     }
 }
 
@@ -185,7 +193,7 @@ impl Rendering {
     /// When the scene is not valid; the message names the line and the remedy.
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let checker = Checker { path: path.as_ref(), text };
-        convert::rendering(&checker, &mut checker.read()?)
+        file::rendering(&checker, &mut checker.read()?)
     }
 }
 

@@ -40,7 +40,8 @@ impl fmt::Display for Range {
 }
 
 impl Range {
-    fn holds(self, x: f64) -> bool {
+    /// Whether `x` is in it.
+    pub fn holds(self, x: f64) -> bool {
         x.abs() <= LARGEST
             && match self {
                 Self::Finite => true,
@@ -51,7 +52,8 @@ impl Range {
             }
     }
 
-    fn check<E: Error>(self, x: f64) -> Result<f64, E> {
+    /// Takes `x`.
+    pub fn check<E: Error>(self, x: f64) -> Result<f64, E> {
         if self.holds(x) {
             return Ok(x);
         }
@@ -163,6 +165,11 @@ pub(super) fn not_negative<'de, T: From<f64>, D: Deserializer<'de>>(value: D) ->
     Range::NotNegative.number(value)
 }
 
+/// Reads a number between zero and one.
+pub(super) fn share<'de, T: From<f64>, D: Deserializer<'de>>(value: D) -> Result<T, D::Error> {
+    Range::Between(0.0, 1.0).number(value)
+}
+
 /// Reads one positive number for all joints, or one each.
 pub(super) fn positive_gains<'de, D: Deserializer<'de>>(value: D) -> Result<JointVector, D::Error> {
     Range::Positive.per_joint(value)
@@ -187,6 +194,16 @@ pub(super) fn direction<'de, D: Deserializer<'de>>(value: D) -> Result<DVec3, D:
 /// Reads the lengths of three edges.
 pub(super) fn edges<'de, T: From<DVec3>, D: Deserializer<'de>>(value: D) -> Result<T, D::Error> {
     Range::Positive.array(value).map(|list| DVec3::from_array(list).into())
+}
+
+/// Reads two numbers, the first less than the second.
+pub(super) fn interval<'de, D: Deserializer<'de>>(value: D) -> Result<[f64; 2], D::Error> {
+    let [least, greatest] = Range::Finite.array(value)?;
+    if least >= greatest {
+        let what = format!("{KEY}is [{least}, {greatest}]: the first must be less than the second");
+        return Err(D::Error::custom(what));
+    }
+    Ok([least, greatest])
 }
 
 /// Reads a whole number from `LEAST` to `GREATEST`.
