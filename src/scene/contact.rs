@@ -1,7 +1,7 @@
 //! `[contact]`: equation (2) and how it is solved.
 
 use super::check::Checker;
-use super::value::{KEY, Range, positive, share};
+use super::value::{KEY, Range, defaults, positive, share};
 use super::{ProxySpec, SceneError};
 use serde::de::{Deserialize, Deserializer, Error, Unexpected, Visitor};
 use std::fmt;
@@ -103,16 +103,13 @@ impl Algorithm {
     }
 }
 
-/// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to 1e-6
-/// of the largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two
-/// digits more cost 8 % more iterations on the sphere (5.1 to 5.5).
-fn tolerance() -> f64 {
-    1e-8
-}
-
-/// Default cap on the contact solver's iterations (1).
-fn max_iterations() -> u32 {
-    400
+defaults! {
+    /// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to 1e-6
+    /// of the largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two
+    /// digits more cost 8 % more iterations on the sphere (5.1 to 5.5).
+    tolerance: f64 = 1e-8;
+    /// Default cap on the contact solver's iterations (1).
+    max_iterations: u32 = 400;
 }
 
 fn at_least_one<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {

@@ -1,7 +1,7 @@
 //! `[device]`: how a real haptic device stands to the scene's arm.
 
 use super::check::Checker;
-use super::value::{KEY, Range, not_negative, positive};
+use super::value::{KEY, Range, coordinates, not_negative, positive};
 use super::{ProxySpec, SceneError};
 use crate::JointVector;
 use serde::de::{Deserialize, Deserializer, Error};
@@ -52,23 +52,14 @@ impl DeviceSpec {
     }
 }
 
-fn coordinates<'de, D: Deserializer<'de>>(value: D) -> Result<Option<JointVector>, D::Error> {
-    Range::Finite.joints(value)
-}
-
 fn sizes<'de, D: Deserializer<'de>>(value: D) -> Result<Option<JointVector>, D::Error> {
     Range::NotNegative.joints(value)
 }
 
 /// Reads the rows of a square matrix.
 fn square<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Vec<JointVector>>, D::Error> {
-    struct Row(JointVector);
-
-    impl<'de> Deserialize<'de> for Row {
-        fn deserialize<D: Deserializer<'de>>(value: D) -> Result<Self, D::Error> {
-            Range::Finite.joints(value).map(Self)
-        }
-    }
+    #[derive(serde::Deserialize)]
+    struct Row(#[serde(deserialize_with = "coordinates")] JointVector);
 
     let rows: Vec<JointVector> = Vec::<Row>::deserialize(value)?.into_iter().map(|Row(row)| row).collect();
     match rows.iter().find(|row| row.len() != rows.len()) {

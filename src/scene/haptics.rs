@@ -5,7 +5,7 @@
 
 use super::check::Checker;
 use super::gains::{GAINS, OF_THE_DEVICE, OF_THE_HAND};
-use super::value::{KEY, Range, gains, not_negative, positive, positive_gains, share};
+use super::value::{KEY, Range, defaults, gains, not_negative, positive, positive_gains, share};
 use super::{JointSpec, SceneError};
 use crate::JointVector;
 use serde::Deserialize;
@@ -187,15 +187,12 @@ const CHANNELS: [f64; 4] = [0.5, 1.0, 1.0, 0.5];
 /// Default time constant of its filter (s).
 const CHANNEL_FILTER: f64 = 0.005;
 
-/// Default stiffness of a bristle (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for a
-/// slip.
-fn bristle_stiffness() -> f64 {
-    500.0
-}
-
-/// Default damping of a bristle (N s/m).
-fn bristle_damping() -> f64 {
-    1.0
+defaults! {
+    /// Default stiffness of a bristle (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for a
+    /// slip.
+    bristle_stiffness: f64 = 500.0;
+    /// Default damping of a bristle (N s/m).
+    bristle_damping: f64 = 1.0;
 }
 
 impl Default for HapticsSpec {

@@ -1,7 +1,7 @@
 //! `[motion]`: named motions of the hand.
 
 use super::check::Checker;
-use super::value::{KEY, Range, not_negative};
+use super::value::{KEY, coordinates, not_negative};
 use super::{JointSpec, SceneError};
 use crate::JointVector;
 use serde::de::{Deserialize, Deserializer, Error};
@@ -65,8 +65,4 @@ fn waypoints<'de, D: Deserializer<'de>>(value: D) -> Result<Vec<Waypoint>, D::Er
         return Err(D::Error::custom(format!("{KEY}needs at least two waypoints")));
     }
     Ok(waypoints)
-}
-
-fn coordinates<'de, D: Deserializer<'de>>(value: D) -> Result<JointVector, D::Error> {
-    Range::Finite.joints(value)
 }

@@ -3,7 +3,7 @@
 use super::SceneError;
 use super::check::Checker;
 use super::skin::{SkinSpec, SkinTable};
-use super::value::{KEY, Range, count, finite, not_negative, positive, vector};
+use super::value::{KEY, Range, count, defaults, finite, not_negative, positive, vector};
 use glam::DVec3;
 use serde::de::{Deserialize, Deserializer, Error};
 use std::path::PathBuf;
@@ -201,14 +201,13 @@ pub(super) struct ObjectTable {
     node_damping: f64,
 }
 
-/// Default mass of a node (kg).
-fn node_mass() -> f64 {
-    0.005
-}
-
-/// Default damping of a node against the ground (N s/m).
-fn node_damping() -> f64 {
-    0.5
+defaults! {
+    /// Default mass of a node (kg).
+    node_mass: f64 = 0.005;
+    /// Default damping of a node against the ground (N s/m).
+    node_damping: f64 = 0.5;
+    /// Default scale of a mesh (1).
+    scale: f64 = 1.0;
 }
 
 #[derive(serde::Deserialize)]
@@ -239,11 +238,6 @@ struct MeshTable {
     centre: DVec3,
     #[serde(default, deserialize_with = "positive")]
     refine: Option<f64>,
-}
-
-/// Default scale of a mesh (1).
-fn scale() -> f64 {
-    1.0
 }
 
 #[derive(serde::Deserialize)]

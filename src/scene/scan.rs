@@ -3,7 +3,9 @@
 
 use super::check::Checker;
 use super::grid::GridTable;
-use super::value::{KEY, Range, count, direction, edges, gains, not_negative, positive, positive_gains, vector};
+use super::value::{
+    KEY, Range, count, defaults, direction, edges, gains, not_negative, positive, positive_gains, vector,
+};
 use super::{GridSpec, JointKind, ProxySpec, SceneError};
 use crate::JointVector;
 use glam::DVec3;
@@ -245,27 +247,15 @@ fn corners<'de, D: Deserializer<'de>>(value: D) -> Result<[DVec3; 2], D::Error> 
     }
 }
 
-/// Default greatest speed (rad/s or m/s).
-fn limit_speed() -> f64 {
-    3.0
-}
-
-/// Default coefficient of friction on the specimen (1).
-fn friction() -> f64 {
-    0.4
-}
-
-/// Default encoder counts a revolution or metre.
-fn encoder() -> f64 {
-    40_000.0
-}
-
-/// Default noise of the actuators (N m).
-fn noise() -> f64 {
-    2e-3
-}
-
-/// Default dry friction of the joints (N m).
-fn joint_friction() -> f64 {
-    2e-3
+defaults! {
+    /// Default greatest speed (rad/s or m/s).
+    limit_speed: f64 = 3.0;
+    /// Default coefficient of friction on the specimen (1).
+    friction: f64 = 0.4;
+    /// Default encoder counts a revolution or metre.
+    encoder: f64 = 40_000.0;
+    /// Default noise of the actuators (N m).
+    noise: f64 = 2e-3;
+    /// Default dry friction of the joints (N m).
+    joint_friction: f64 = 2e-3;
 }

@@ -10,6 +10,15 @@ use std::fmt;
 /// Stands for the key of the value at the head of a message.
 pub(super) const KEY: &str = "{key} ";
 
+/// Functions that tell serde the values of keys that are not given.
+macro_rules! defaults {
+    ($($(#[$doc:meta])* $key:ident: $kind:ty = $value:expr;)*) => {
+        $($(#[$doc])* fn $key() -> $kind { $value })*
+    };
+}
+
+pub(super) use defaults;
+
 /// Largest size of any number: far beyond every physical quantity in SI units that a scene may hold, and its powers
 /// that the engine forms are still finite.
 const LARGEST: f64 = 1e12;
@@ -178,6 +187,11 @@ pub(super) fn positive_gains<'de, D: Deserializer<'de>>(value: D) -> Result<Join
 /// Reads one number, zero or positive, for all joints, or one each.
 pub(super) fn gains<'de, D: Deserializer<'de>>(value: D) -> Result<JointVector, D::Error> {
     Range::NotNegative.per_joint(value)
+}
+
+/// Reads coordinates of joints, or of a device.
+pub(super) fn coordinates<'de, T: From<JointVector>, D: Deserializer<'de>>(value: D) -> Result<T, D::Error> {
+    Range::Finite.joints(value)
 }
 
 /// Reads a point or a vector.
