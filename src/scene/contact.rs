@@ -3,14 +3,10 @@
 use super::check::Checker;
 use super::value::{KEY, Range, defaults, positive, share};
 use super::{ProxySpec, SceneError};
-use serde::de::{Deserialize, Deserializer, Error, Unexpected, Visitor};
-use std::fmt;
+use serde::de::{Deserialize, Deserializer, Error};
 
 /// Most updates of linearised contact (1): far more than where it settles, and still milliseconds for a configuration.
 const MAX_UPDATES: u32 = 1000;
-
-/// Contact as stiff as makes no difference, as a scene names it.
-const RIGID: &str = "rigid";
 
 /// Equation (2) and how it is solved.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
@@ -132,29 +128,7 @@ fn updates<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
 
 /// Reads a stiffness: a positive number, or `"rigid"` for infinity.
 fn number_or_rigid<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
-    struct NumberOrRigid;
-
-    impl Visitor<'_> for NumberOrRigid {
-        type Value = f64;
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            write!(f, "a number or {RIGID:?}")
-        }
-
-        fn visit_f64<E: Error>(self, value: f64) -> Result<f64, E> {
-            Range::Positive.check(value)
-        }
-
-        fn visit_i64<E: Error>(self, value: i64) -> Result<f64, E> {
-            self.visit_f64(value as f64)
-        }
-
-        fn visit_str<E: Error>(self, value: &str) -> Result<f64, E> {
-            if value == RIGID { Ok(f64::INFINITY) } else { Err(E::invalid_value(Unexpected::Str(value), &self)) }
-        }
-    }
-
-    value.deserialize_any(NumberOrRigid)
+    Range::Positive.number_or("rigid", value)
 }
 
 impl ContactSpec {

@@ -61,8 +61,7 @@ impl Range {
             }
     }
 
-    /// Takes `x`.
-    pub fn check<E: Error>(self, x: f64) -> Result<f64, E> {
+    fn check<E: Error>(self, x: f64) -> Result<f64, E> {
         if self.holds(x) {
             return Ok(x);
         }
@@ -76,6 +75,11 @@ impl Range {
     /// Reads a number.
     pub fn number<'de, T: From<f64>, D: Deserializer<'de>>(self, value: D) -> Result<T, D::Error> {
         self.deserialize(value).map(T::from)
+    }
+
+    /// Reads a number, or `word` for infinity.
+    pub fn number_or<'de, D: Deserializer<'de>>(self, word: &'static str, value: D) -> Result<f64, D::Error> {
+        value.deserialize_any(Number { range: self, or_infinite: Some(word) })
     }
 
     /// Reads a list of numbers.
@@ -111,25 +115,37 @@ impl<'de> DeserializeSeed<'de> for Range {
     type Value = f64;
 
     fn deserialize<D: Deserializer<'de>>(self, value: D) -> Result<f64, D::Error> {
-        value.deserialize_any(Number(self))
+        value.deserialize_any(Number { range: self, or_infinite: None })
     }
 }
 
-struct Number(Range);
+/// A number, or a word that stands for infinity.
+struct Number {
+    range: Range,
+    or_infinite: Option<&'static str>,
+}
 
 impl Visitor<'_> for Number {
     type Value = f64;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number")
+        f.write_str("a number")?;
+        self.or_infinite.map_or(Ok(()), |word| write!(f, " or {word:?}"))
     }
 
     fn visit_f64<E: Error>(self, value: f64) -> Result<f64, E> {
-        self.0.check(value)
+        self.range.check(value)
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<f64, E> {
-        self.0.check(value as f64)
+        self.range.check(value as f64)
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<f64, E> {
+        if self.or_infinite == Some(value) {
+            return Ok(f64::INFINITY);
+        }
+        Err(E::invalid_type(Unexpected::Str(value), &self))
     }
 }
 
