@@ -79,9 +79,9 @@ impl Checker<'_> {
         }
     }
 
-    /// Brings `list`, which stands at `path` in the text, to one number per joint: one number is that of all joints, and
-    /// where the text has none, `default` tells it by the kind of joint. Where the chain mixes kinds of joint, a single
-    /// number has no one unit and is refused.
+    /// Brings `list`, which stands at `path` in the text, to one number per joint: one number is that of all joints,
+    /// and where the text has none, `default` tells it by the kind of joint. Where the chain mixes kinds of joint, a
+    /// single number has no one unit and is refused.
     pub fn fit(
         &self,
         path: &str,

@@ -100,9 +100,9 @@ impl Algorithm {
 }
 
 defaults! {
-    /// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to 1e-6
-    /// of the largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so two
-    /// digits more cost 8 % more iterations on the sphere (5.1 to 5.5).
+    /// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to
+    /// 1e-6 of the largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so
+    /// two digits more cost 8 % more iterations on the sphere (5.1 to 5.5).
     tolerance: f64 = 1e-8;
     /// Default cap on the contact solver's iterations (1).
     max_iterations: u32 = 400;
@@ -119,8 +119,8 @@ fn updates<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
     let updates = u32::deserialize(value)?;
     if updates > MAX_UPDATES {
         return Err(D::Error::custom(format!(
-            "{KEY}is {updates}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm = \
-             \"energy\""
+            "{KEY}is {updates}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm \
+             = \"energy\""
         )));
     }
     Ok(updates)

@@ -45,8 +45,8 @@ const EXCERPT_WIDTH: usize = 110;
 const EXCERPT_LEAD: usize = 60;
 
 impl Diagnostic {
-    /// A message about the value that `key` names in a scene's `text`, keys and numbers of entries with dots between, or
-    /// about the table around it where it is not there.
+    /// A message about the value that `key` names in a scene's `text`, keys and numbers of entries with dots between,
+    /// or about the table around it where it is not there.
     #[must_use]
     pub fn at(path: &Path, text: &str, key: &str, message: impl Into<String>) -> Self {
         Self::new(path, text, find(text, key).0, message)

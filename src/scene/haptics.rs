@@ -188,14 +188,15 @@ const CHANNELS: [f64; 4] = [0.5, 1.0, 1.0, 0.5];
 const CHANNEL_FILTER: f64 = 0.005;
 
 defaults! {
-    /// Default stiffness of a bristle (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for a
-    /// slip.
+    /// Default stiffness of a bristle (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for
+    /// a slip.
     bristle_stiffness: f64 = 500.0;
     /// Default damping of a bristle (N s/m).
     bristle_damping: f64 = 1.0;
 }
 
 impl Default for HapticsSpec {
+    /// A loop of no arm yet: lists are empty until `check` fits them to one.
     fn default() -> Self {
         let unset = JointVector::default();
         Self {

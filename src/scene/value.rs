@@ -1,5 +1,5 @@
-//! Values of a scene file that are checked while they are read: each failure names the key, the value and the range, and
-//! the reader of the file adds the place.
+//! Values of a scene file that are checked while they are read: each failure names the key, the value and the range,
+//! and the reader of the file adds the place.
 
 use crate::{JointVector, MAX_JOINTS};
 use glam::DVec3;
@@ -98,7 +98,8 @@ impl Range {
         joint_vector(&self.list(value)?).map(T::from)
     }
 
-    /// Reads one number for all joints, or a list with one for each. [`super::check::Checker::fit`] gives the one to all.
+    /// Reads one number for all joints, or a list with one for each; [`super::check::Checker::fit`] gives the one to
+    /// all.
     pub fn per_joint<'de, D: Deserializer<'de>>(self, value: D) -> Result<JointVector, D::Error> {
         joint_vector(&value.deserialize_any(List { range: self, or_one: true })?)
     }
