@@ -1,10 +1,113 @@
-//! Comma-separated text: the one way in which all tables are written, and the fields of a line that is read.
+//! Tables of text: the one way in which they are written, and in which their lines are read.
 
-use crate::names::{escaped, is_disruptive};
+use crate::{
+    input,
+    names::{escaped, is_disruptive},
+};
 use std::{
     fmt::Display,
-    io::{self, Write},
+    fs::File,
+    io::{self, BufRead, BufReader, Read, Write},
+    path::{Path, PathBuf},
 };
+
+/// A table of text cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {source}; check the path and its permissions", .file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is too large.
+    #[error("{}: larger than {greatest} bytes: {remedy}", .file.display())]
+    Size {
+        /// The file.
+        file: PathBuf,
+        /// Largest file that is read (bytes).
+        greatest: u64,
+        /// What it is not, or what to do.
+        remedy: &'static str,
+    },
+    /// A line is not what it should be.
+    #[error("{}:{line}: {what}", .file.display())]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// Number of the line, from 1.
+        line: u64,
+        /// Problem and remedy, in words.
+        what: String,
+    },
+}
+
+/// Longest line that is read (bytes); a binary file has no line ends.
+pub(crate) const LONGEST_LINE: u64 = 1 << 20;
+
+/// The lines of a table, read one at a time: nothing of the text is held but the caller's line.
+pub(crate) struct Lines<R> {
+    file: PathBuf,
+    reader: R,
+    /// Number of the line read last, from 1.
+    pub number: u64,
+    /// Bytes read so far.
+    pub bytes: u64,
+}
+
+impl Lines<BufReader<File>> {
+    /// Opens `file`, unless it is larger than `greatest` bytes, where `remedy` is what it is not or what to do.
+    pub fn open(file: &Path, greatest: u64, remedy: &'static str) -> Result<Self, TableError> {
+        let opened = input::open(file).and_then(|opened| Ok((opened.metadata()?.len(), opened)));
+        match opened {
+            Err(source) => Err(TableError::Read { file: file.into(), source }),
+            Ok((length, _)) if length > greatest => Err(TableError::Size { file: file.into(), greatest, remedy }),
+            Ok((_, opened)) => Ok(Self::new(file, BufReader::new(opened))),
+        }
+    }
+}
+
+impl<R: BufRead> Lines<R> {
+    /// The lines of `reader`, which messages call `file`.
+    pub fn new(file: &Path, reader: R) -> Self {
+        Self { file: file.into(), reader, number: 0, bytes: 0 }
+    }
+
+    /// An error in the line read last.
+    pub fn error(&self, what: impl Into<String>) -> TableError {
+        TableError::Line { file: self.file.clone(), line: self.number, what: what.into() }
+    }
+
+    /// Reads a line into `line`, without its end and without a byte order mark; none at the end of the text.
+    pub fn next<'l>(&mut self, line: &'l mut Vec<u8>) -> Result<Option<&'l [u8]>, TableError> {
+        line.clear();
+        let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', line);
+        let read = read.map_err(|source| TableError::Read { file: self.file.clone(), source })? as u64;
+        if read == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        self.bytes += read;
+        if read == LONGEST_LINE && !line.ends_with(b"\n") {
+            let what = format!("the line is longer than {LONGEST_LINE} bytes: this is not a table of text");
+            return Err(self.error(what));
+        }
+        while line.last().is_some_and(|byte| matches!(byte, b'\n' | b'\r')) {
+            line.pop();
+        }
+        let mark: &[u8] = if self.number == 1 { "\u{feff}".as_bytes() } else { b"" };
+        Ok(Some(line.strip_prefix(mark).unwrap_or(line)))
+    }
+
+    /// Reads a line of text into `line`, as [`Lines::next`] does.
+    pub fn next_text<'l>(&mut self, line: &'l mut Vec<u8>) -> Result<Option<&'l str>, TableError> {
+        let text = self.next(line)?.map(std::str::from_utf8).transpose();
+        text.map_err(|_| self.error("not text in UTF-8"))
+    }
+}
 
 /// A table that is being written, field by field.
 pub(crate) struct Table<W> {
@@ -115,6 +218,29 @@ mod tests {
             assert_eq!(quoted(text), field);
         }
         assert_eq!(plain("a,b\"c\nd\u{1b}e\u{2028}f"), "a_b_c_d_e_f");
+    }
+
+    #[test]
+    fn lines_are_numbered_and_none_is_longer_than_a_table_has() {
+        let lines = |text: &[u8]| -> Result<Vec<(u64, String)>, String> {
+            let (mut lines, mut line, mut found) = (Lines::new(Path::new("t.csv"), text), Vec::new(), Vec::new());
+            while let Some(text) = lines.next_text(&mut line).map_err(|error| error.to_string())? {
+                let text = text.to_owned();
+                found.push((lines.number, text));
+            }
+            assert_eq!(lines.bytes, text.len() as u64);
+            Ok(found)
+        };
+        let rows = |texts: [&str; 3]| (1..).zip(texts.map(str::to_owned)).collect::<Vec<_>>();
+        assert_eq!(lines(b"\xef\xbb\xbfa,b \r\n\n1,2").unwrap(), rows(["a,b ", "", "1,2"]));
+        assert_eq!(lines(b"a\n\xef\xbb\xbfb\n \n").unwrap(), rows(["a", "\u{feff}b", " "]));
+        assert_eq!(lines(b"").unwrap(), []);
+        assert_eq!(lines(b"a\n\xff\n").unwrap_err(), "t.csv:2: not text in UTF-8");
+        let longest = LONGEST_LINE as usize - 1;
+        let with_end = [vec![b'x'; longest], vec![b'\n', b'y']].concat();
+        assert_eq!(lines(&with_end).unwrap().len(), 2);
+        let refused = lines(&vec![b'x'; longest + 1]).unwrap_err();
+        assert!(refused.starts_with("t.csv:1: the line is longer"), "{refused}");
     }
 
     #[test]

@@ -50,3 +50,9 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
     };
     Err(io::Error::new(io::ErrorKind::InvalidInput, what))
 }
+
+/// Whether the file at `path` begins with `start`.
+pub(crate) fn begins(path: &Path, start: &[u8]) -> bool {
+    let mut head = vec![0; start.len()];
+    open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok() && head == start
+}

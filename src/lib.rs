@@ -110,5 +110,6 @@ pub mod memory;
 mod names;
 mod random;
 
+pub use csv::TableError;
 pub use joint_matrix::JointMatrix;
 pub use joint_vector::{JointVector, MAX_JOINTS};

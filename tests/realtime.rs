@@ -27,8 +27,8 @@ use haptize::{
         setup::{Setup, labels},
     },
     scene::{
-        ContactDampingSpec, FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticEffects, HapticsSpec,
-        Interpolation, ProxyInertia, Scene, Waypoint,
+        FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticsSpec, Interpolation, ProxyInertia, Scene,
+        Waypoint,
     },
     store::{Order, Space, Store},
     sweep::{
@@ -326,25 +326,17 @@ fn the_first_deadline_comes_after_the_system_has_granted_what_it_grants() {
 }
 
 /// Friction and contact damping as the tests feel them.
-fn rubbing() -> HapticEffects {
-    HapticEffects {
-        friction: Some(FrictionSpec {
-            coefficient: 0.3,
-            static_coefficient: 0.4,
-            stiffness: 500.0,
-            damping: 1.0,
-            place: 0..0,
-        }),
-        contact_damping: Some(ContactDampingSpec { damping: 5.0, place: 0..0 }),
-        ..HapticEffects::default()
-    }
+fn rubbing(gains: &mut HapticsSpec) {
+    let (static_coefficient, stiffness) = (Some(0.4), 500.0);
+    gains.friction = Some(FrictionSpec { coefficient: 0.3, static_coefficient, stiffness, damping: 1.0 });
+    gains.contact_damping = Some(5.0);
 }
 
 /// The sphere over every third line of its grid, a little less than the joints can reach, with what friction and
 /// contact damping need.
 fn sphere() -> Dataset {
     let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
-    scene.haptics.effects = rubbing();
+    rubbing(&mut scene.haptics);
     for axis in &mut scene.grid.axes {
         (axis.step, axis.count) = (3.0 * axis.step, axis.count.div_ceil(3));
     }
@@ -356,27 +348,31 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     let data = sphere();
     let setup = Setup::new(&data).unwrap();
     let press = setup.scene.motion.press[2].q;
-    let HapticEffects { friction, contact_damping, .. } = rubbing();
-    let channels = FourChannelSpec { channels: [0.5, 1.0, 1.0, 0.5], filter: 0.005 };
-    let none = HapticEffects::default();
+    let mut all = setup.scene.haptics.clone();
+    rubbing(&mut all);
+    all.four_channel = Some(FourChannelSpec { channels: [0.5, 1.0, 1.0, 0.5], filter: 0.005 });
+    all.passivity_control = true;
+    let HapticsSpec { friction, contact_damping, four_channel, .. } = all;
+    let none = HapticsSpec {
+        friction: None,
+        contact_damping: None,
+        four_channel: None,
+        passivity_control: false,
+        ..all.clone()
+    };
     let effects = [
         none.clone(),
-        HapticEffects { friction: friction.clone(), ..none.clone() },
-        HapticEffects { contact_damping: contact_damping.clone(), ..none.clone() },
-        HapticEffects { four_channel: Some(channels), ..none.clone() },
-        HapticEffects { passivity_control: true, ..none },
-        HapticEffects { friction, contact_damping, four_channel: Some(channels), passivity_control: true },
+        HapticsSpec { friction, ..none.clone() },
+        HapticsSpec { contact_damping, ..none.clone() },
+        HapticsSpec { four_channel, ..none.clone() },
+        HapticsSpec { passivity_control: true, ..none },
+        all,
     ];
     let mut touched = 0;
     for interpolation in Interpolation::ALL {
         for inertia in [ProxyInertia::Constant, ProxyInertia::Configuration] {
             for effects in &effects {
-                let gains = HapticsSpec {
-                    interpolation,
-                    proxy_inertia: inertia,
-                    effects: effects.clone(),
-                    ..setup.scene.haptics.clone()
-                };
+                let gains = HapticsSpec { interpolation, proxy_inertia: inertia, ..effects.clone() };
                 let (haptics, _) = setup.retuned(&data, &gains).unwrap();
                 let mut state = haptics.start(&setup.scene.motion.press[0].q).unwrap();
                 let mut before = setup.scene.motion.press[0].q;

@@ -8,15 +8,12 @@
 
 use crate::{
     JointVector,
-    csv::{fields, plain},
+    csv::{Lines, TableError, fields, plain},
     dataset::JointLabel,
-    input::{self, GREATEST_INPUT},
+    input::GREATEST_INPUT,
     scene::{JointKind, JointSpec, Waypoint},
 };
-use std::{
-    io::{self, BufRead, BufReader},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 /// A motion; before its first and after its last waypoint it rests there.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,33 +73,9 @@ pub enum MotionError {
         /// What may be the cause, in words, or nothing.
         hint: &'static str,
     },
-    /// The file cannot be read.
-    #[error("{}: cannot be read: {source}", .file.display())]
-    Read {
-        /// The motion's file.
-        file: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The file is too large to be a motion.
-    #[error("{}: larger than {GREATEST_FILE} bytes: not a motion", .file.display())]
-    Size {
-        /// The motion's file.
-        file: PathBuf,
-    },
-    /// A line of the file is not a sample.
-    #[error("{}:{line}: {what}; each line gives a time in seconds and {joints} coordinates, separated by commas",
-        .file.display())]
-    Line {
-        /// The motion's file.
-        file: PathBuf,
-        /// Line number, from one.
-        line: usize,
-        /// The defect.
-        what: String,
-        /// Number of joints of the proxy.
-        joints: usize,
-    },
+    /// The file cannot be read, or a line of it is not a sample.
+    #[error(transparent)]
+    File(#[from] TableError),
 }
 
 /// Largest file that is read (bytes): a day of six joints at 20 Hz, or an hour at 1 kHz.
@@ -148,24 +121,15 @@ impl Motion {
     /// names file and line.
     pub fn from_csv(file: &Path, labels: &[JointLabel]) -> Result<Self, MotionError> {
         let joints = labels.len();
-        let unreadable = |source| MotionError::Read { file: file.into(), source };
-        let opened = input::open(file).map_err(unreadable)?;
-        if opened.metadata().map_err(unreadable)?.len() > GREATEST_FILE {
-            return Err(MotionError::Size { file: file.into() });
-        }
-        let mut reader = BufReader::new(opened);
-        let mut waypoints: Vec<Waypoint> = Vec::new();
-        let (mut bytes, mut number) = (Vec::new(), 0);
+        let mut lines = Lines::open(file, GREATEST_FILE, "not a motion")?;
+        let (mut waypoints, mut line): (Vec<Waypoint>, _) = (Vec::new(), Vec::new());
         let mut columns: Option<Columns> = None;
-        loop {
-            bytes.clear();
-            if reader.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
-                break;
-            }
-            number += 1;
-            let bad = |what: String| MotionError::Line { file: file.into(), line: number, what, joints };
-            let text = std::str::from_utf8(&bytes).map_err(|_| bad("not text".into()))?;
-            let text = text.trim_start_matches('\u{feff}').trim();
+        while let Some(text) = lines.next_text(&mut line)? {
+            let bad = |what| {
+                let sample = format!("each line gives a time in seconds and {joints} coordinates, separated by commas");
+                lines.error(format!("{what}; {sample}"))
+            };
+            let text = text.trim();
             if text.is_empty() || text.starts_with(['#', '%']) {
                 continue;
             }
@@ -180,7 +144,7 @@ impl Motion {
             };
             let point = columns.sample(text).map_err(bad)?;
             if waypoints.last().is_some_and(|last| last.time >= point.time) {
-                return Err(bad(format!("time {} s does not come after the line before", point.time)));
+                return Err(bad(format!("time {} s does not come after the line before", point.time)).into());
             }
             waypoints.push(point);
         }
@@ -402,7 +366,10 @@ mod tests {
         }
         assert!(matches!(read(b""), Err(MotionError::NoSample { .. })));
         assert!(matches!(read(b"time,shoulder,elbow\n"), Err(MotionError::NoSample { .. })));
-        assert!(matches!(Motion::from_csv(Path::new("/nowhere.csv"), &[]), Err(MotionError::Read { .. })));
+        assert!(matches!(
+            Motion::from_csv(Path::new("/nowhere.csv"), &[]),
+            Err(MotionError::File(TableError::Read { .. }))
+        ));
     }
 
     #[test]

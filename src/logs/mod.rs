@@ -21,6 +21,7 @@ pub use mapping::{BadRows, ColumnName, Filter, Joint, Keep, Mapping, MappingErro
 
 use crate::{
     JointVector,
+    csv::TableError,
     gridize::Samples,
     input,
     ros::{JointStateTable, RosError, is_mcap},
@@ -41,24 +42,9 @@ const IMPORT_SAMPLES: usize = 5_000_000;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// The file cannot be read.
-    #[error("{file}: cannot be read: {source}; check the path and its permissions")]
-    Read {
-        /// The file.
-        file: String,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// A line that cannot be used.
-    #[error("{file}:{line}: {message}")]
-    Line {
-        /// The file.
-        file: String,
-        /// From 1.
-        line: u64,
-        /// Problem and remedy, in words.
-        message: String,
-    },
+    /// The file cannot be read, or a line of it cannot be used.
+    #[error(transparent)]
+    Table(TableError),
     /// Every row would be a sample.
     #[error("more than {limit} samples: set filter.decimate, or average rows in cells (torque.keep and torque.cell)")]
     TooManySamples {
@@ -118,6 +104,19 @@ pub struct Dropped {
     pub rows: u64,
     /// File and line of the first.
     pub first: String,
+}
+
+impl From<TableError> for ImportError {
+    /// What went wrong in a table of joint states is what went wrong in their file.
+    fn from(error: TableError) -> Self {
+        match error {
+            TableError::Read { file, source } => match source.downcast::<RosError>() {
+                Ok(error) => Self::Ros(error),
+                Err(source) => Self::Table(TableError::Read { file, source }),
+            },
+            other => Self::Table(other),
+        }
+    }
 }
 
 impl fmt::Display for Dropped {
@@ -200,7 +199,7 @@ pub fn import(
         let opened: Box<dyn Read> = if of_robot {
             Box::new(JointStateTable::open(path, mapping.table.topic.as_deref())?)
         } else {
-            Box::new(input::open(path).map_err(|source| ImportError::Read { file: file.clone(), source })?)
+            Box::new(input::open(path).map_err(|source| TableError::Read { file: path.clone(), source })?)
         };
         bytes += import.read(BufReader::with_capacity(1 << 16, opened), &file, &mut |read, rows| {
             progress(ImportProgress { bytes: bytes + read, rows });
@@ -286,20 +285,20 @@ impl<'a> Import<'a> {
                 ReadRowResult::Row(row) => row,
                 ReadRowResult::Dropped(reason) => {
                     self.report.rows += 1;
-                    self.drop_row(reason, file, rows.line());
+                    self.drop_row(reason, file, rows.lines.number);
                     continue;
                 }
             };
             self.report.rows += 1;
             self.take(row, file)?;
             if self.report.rows.is_multiple_of(ROWS_A_REPORT) {
-                progress(rows.bytes, self.report.rows);
+                progress(rows.lines.bytes, self.report.rows);
             }
         }
         self.report.gaps += rows.gaps;
         self.end_segment(file)?;
-        progress(rows.bytes, self.report.rows);
-        Ok(rows.bytes)
+        progress(rows.lines.bytes, self.report.rows);
+        Ok(rows.lines.bytes)
     }
 
     fn drop_row(&mut self, reason: Reason, file: &str, line: u64) {

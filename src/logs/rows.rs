@@ -4,11 +4,11 @@ use super::{
     ImportError, Reason,
     mapping::{BadRows, ColumnName, Mapping, Quantity},
 };
-use crate::{JointVector, csv::fields};
-use std::io::{BufRead, Read};
-
-/// Longest line that is read (bytes); a binary file has no line ends.
-const LONGEST_LINE: u64 = 1 << 20;
+use crate::{
+    JointVector,
+    csv::{Lines, fields},
+};
+use std::{io::BufRead, path::Path};
 
 /// One usable row.
 #[derive(Clone, Copy, Debug)]
@@ -26,11 +26,8 @@ pub(super) struct Row {
 /// Reads rows from `reader`.
 pub(super) struct Rows<'a, R> {
     mapping: &'a Mapping,
-    reader: R,
+    pub lines: Lines<R>,
     file: String,
-    line: u64,
-    /// Bytes read so far.
-    pub bytes: u64,
     text: Vec<u8>,
     layout: Option<Layout>,
     last_time: Option<f64>,
@@ -59,10 +56,8 @@ impl<'a, R: BufRead> Rows<'a, R> {
     pub fn new(mapping: &'a Mapping, reader: R, file: &str) -> Self {
         Self {
             mapping,
-            reader,
+            lines: Lines::new(Path::new(file), reader),
             file: file.to_owned(),
-            line: 0,
-            bytes: 0,
             text: Vec::new(),
             layout: None,
             last_time: None,
@@ -71,56 +66,25 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
     }
 
-    /// Number of the line read last.
-    pub fn line(&self) -> u64 {
-        self.line
-    }
-
     /// The next row, or why a line was left out.
     pub fn next(&mut self) -> Result<ReadRowResult, ImportError> {
-        loop {
-            if !self.read_line()? {
-                return Ok(ReadRowResult::End);
-            }
+        let mut line = std::mem::take(&mut self.text);
+        while let Some(text) = self.lines.next(&mut line)? {
+            let text = text.trim_ascii_end();
             let comment = self.mapping.table.comment.as_bytes();
-            if self.text.is_empty() || !comment.is_empty() && self.text.starts_with(comment) {
+            if text.is_empty() || !comment.is_empty() && text.starts_with(comment) {
                 continue;
             }
-            let text = std::mem::take(&mut self.text);
-            let outcome = self.line_outcome(&text);
-            self.text = text;
-            if let Some(outcome) = outcome? {
+            if let Some(outcome) = self.line_outcome(text)? {
+                self.text = line;
                 return Ok(outcome);
             }
         }
-    }
-
-    /// Reads one line without its end; false at the end of the file.
-    fn read_line(&mut self) -> Result<bool, ImportError> {
-        self.text.clear();
-        let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut self.text);
-        let read = read.map_err(|source| ImportError::Read { file: self.file.clone(), source })? as u64;
-        if read == 0 {
-            return Ok(false);
-        }
-        self.line += 1;
-        self.bytes += read;
-        if read == LONGEST_LINE && self.text.last() != Some(&b'\n') {
-            return Err(
-                self.error(format!("the line is longer than {LONGEST_LINE} bytes: this is not a table of text"))
-            );
-        }
-        while self.text.last().is_some_and(u8::is_ascii_whitespace) {
-            self.text.pop();
-        }
-        if self.line == 1 && self.text.starts_with(&[0xef, 0xbb, 0xbf]) {
-            self.text.drain(..3);
-        }
-        Ok(true)
+        Ok(ReadRowResult::End)
     }
 
     fn error(&self, message: String) -> ImportError {
-        ImportError::Line { file: self.file.clone(), line: self.line, message }
+        self.lines.error(message).into()
     }
 
     /// Parses a line that is no comment; `None` for the header.
@@ -201,7 +165,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
         self.last_time = Some(time);
         self.count += 1;
-        Ok(ReadRowResult::Row(Row { first, line: self.line, time, q, torque }))
+        Ok(ReadRowResult::Row(Row { first, line: self.lines.number, time, q, torque }))
     }
 
     fn refuse(&self, reason: Reason, message: String) -> Result<ReadRowResult, ImportError> {

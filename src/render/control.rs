@@ -28,7 +28,7 @@ impl PassivityControl {
     /// The controller of `spec`, if the scene names it.
     #[must_use]
     pub fn new(spec: &HapticsSpec) -> Option<Self> {
-        spec.effects.passivity_control.then_some(Self { device_inertia: spec.device_inertia })
+        spec.passivity_control.then_some(Self { device_inertia: spec.device_inertia })
     }
 
     /// Adds to `torque` on the device what takes the energy that its port has given from nowhere, the device moving at

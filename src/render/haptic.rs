@@ -127,7 +127,7 @@ impl Haptics {
         }
         let period = 1.0 / spec.rate;
         let watchdog = Watchdog::new(period, spec.speed_limit);
-        let channels = spec.effects.four_channel.map(|channels| Channels::new(channels, spec));
+        let channels = spec.four_channel.map(|channels| Channels::new(channels, spec));
         let control = PassivityControl::new(spec);
         Ok(Self {
             range: HaptizedRange::of_grid(field.lattice()),

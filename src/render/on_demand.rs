@@ -186,7 +186,7 @@ impl OnDemand {
         let haptics = &self.scene.haptics;
         let followed = Followed {
             torque: haptics.interpolation == Interpolation::Direct,
-            forces: haptics.effects.at_contacts().is_some(),
+            forces: haptics.at_contacts().is_some(),
         };
         let levels = self.store.space().levels();
         let (live, ends) = Live::new(start, levels, &self.levers(), self.threads, followed);

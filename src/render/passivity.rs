@@ -77,7 +77,7 @@ fn encoder_bound(spec: &HapticsSpec, joint: usize) -> f64 {
 
 /// c2 Ks, the stiffness of the object that four channels hand to the device; none without them (N m/rad).
 fn handed_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
-    spec.effects.four_channel.map_or(0.0, |channels| channels.channels[1] * spec.boundary_slope[joint])
+    spec.four_channel.map_or(0.0, |channels| channels.channels[1] * spec.boundary_slope[joint])
 }
 
 /// Returns `spec` with its proxy damping bv raised as far as the slope Ks and the stiffness of `field` ask for;
@@ -230,11 +230,8 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
             ),
         });
         let stiffness = spec.coupling_stiffness[a] + handed_stiffness(spec, a);
-        let name = if spec.effects.four_channel.is_some() {
-            "stiffness Kvc + c2 Ks on the device"
-        } else {
-            "coupling stiffness Kvc"
-        };
+        let name =
+            if spec.four_channel.is_some() { "stiffness Kvc + c2 Ks on the device" } else { "coupling stiffness Kvc" };
         found.push(Bound {
             what: format!("{name} of joint {}", joint.name),
             value: stiffness,

@@ -17,14 +17,13 @@ use super::{
 };
 use crate::{
     JointVector,
-    csv::Table,
+    csv::{Lines, Table, TableError},
     dataset::JointLabel,
     device::{Applied, Device, Reading},
-    input,
 };
 use std::{
-    io::{self, BufRead, BufReader, Write},
-    path::{Path, PathBuf},
+    io::{self, Write},
+    path::Path,
 };
 
 /// All that a session needs to be had again.
@@ -49,38 +48,8 @@ struct Row {
     held: JointVector,
 }
 
-/// A file is not a recording.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RecordingError {
-    /// The file cannot be read.
-    #[error("{}: cannot be read: {source}", .file.display())]
-    Read {
-        /// The recording's file.
-        file: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The file is too large to be a recording.
-    #[error("{}: larger than {GREATEST_FILE} bytes: take a file that `haptize play --record` wrote", .file.display())]
-    Size {
-        /// The recording's file.
-        file: PathBuf,
-    },
-    /// A line is not what it should be.
-    #[error("{}:{line}: {what}; take a file that `haptize play --record` wrote for a proxy of {joints} joints",
-        .file.display())]
-    Line {
-        /// The recording's file.
-        file: PathBuf,
-        /// Line number, from one.
-        line: usize,
-        /// The defect.
-        what: String,
-        /// Joints of the proxy.
-        joints: usize,
-    },
-}
+/// What to do with a file that is no recording.
+const REMEDY: &str = "take a file that `haptize play --record` wrote";
 
 /// Largest file that is read (bytes): two hours of six joints at 1 kHz.
 const GREATEST_FILE: u64 = 4 << 30;
@@ -163,23 +132,14 @@ impl Recording {
     ///
     /// # Errors
     /// When the file cannot be read or is no such recording; the error names file and line.
-    pub fn read(file: &Path, joints: usize) -> Result<Self, RecordingError> {
-        let unreadable = |source| RecordingError::Read { file: file.into(), source };
-        let opened = input::open(file).map_err(unreadable)?;
-        if opened.metadata().map_err(unreadable)?.len() > GREATEST_FILE {
-            return Err(RecordingError::Size { file: file.into() });
-        }
-        let mut reader = BufReader::new(opened);
+    pub fn read(file: &Path, joints: usize) -> Result<Self, TableError> {
+        let mut lines = Lines::open(file, GREATEST_FILE, REMEDY)?;
         let mut recording = Self { start: JointVector::zeros(0), kept: Vec::new(), rows: Vec::new() };
-        let (mut bytes, mut line, mut header) = (Vec::new(), 0, false);
-        loop {
-            bytes.clear();
-            if reader.read_until(b'\n', &mut bytes).map_err(unreadable)? == 0 {
-                break;
-            }
-            line += 1;
-            let bad = |what: String| RecordingError::Line { file: file.into(), line, what, joints };
-            let text = std::str::from_utf8(&bytes).map_err(|_| bad("not text".into()))?.trim();
+        let (mut line, mut header) = (Vec::new(), false);
+        let wrong = |lines: &Lines<_>, what| lines.error(format!("{what}; {REMEDY} for a proxy of {joints} joints"));
+        while let Some(text) = lines.next_text(&mut line)? {
+            let bad = |what: String| wrong(&lines, what);
+            let text = text.trim();
             if let Some(start) = text.strip_prefix(START) {
                 let fields: Vec<&str> = start.split(',').skip(1).collect();
                 recording.start = vector(&fields, joints).map_err(bad)?;
@@ -195,7 +155,7 @@ impl Recording {
         if recording.start.len() != joints || recording.rows.is_empty() {
             let what =
                 format!("{} ticks and a first position of {} joints", recording.rows.len(), recording.start.len());
-            return Err(RecordingError::Line { file: file.into(), line, what, joints });
+            return Err(wrong(&lines, what));
         }
         Ok(recording)
     }

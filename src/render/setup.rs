@@ -223,7 +223,7 @@ fn haptic_loop(
     };
     let bounds = passivity::bounds(&gains, &field, &labels(&dataset.grid));
     let advice = passivity::advice(&gains, &field, &bounds);
-    let effects = ContactEffects::new(&gains.effects, (dataset, explored), chain, &scene.text, &scene.path)?;
+    let effects = ContactEffects::new(&gains, (dataset, explored), chain, &scene.text, &scene.path)?;
     let range = HaptizedRange::new(dataset, chain)?;
     let haptics = Haptics::new(field, npmi, &gains)?.with_range(range).with_effects(effects);
     Ok(Loop { haptics, bounds, gains, advice })

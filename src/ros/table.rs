@@ -26,8 +26,7 @@ pub struct Topic {
 /// Returns whether the file at `path` begins like an MCAP file.
 #[must_use]
 pub fn is_mcap(path: &Path) -> bool {
-    let mut start = [0; mcap::MAGIC.len()];
-    input::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *mcap::MAGIC
+    input::begins(path, mcap::MAGIC)
 }
 
 /// Returns the topics of joint states in the file at `path`, by name.

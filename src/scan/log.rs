@@ -6,11 +6,17 @@
 //! the plan, time, measured configuration, contact torque on the proxy (minus control torque, gravity already
 //! subtracted), standard deviation of a single tick's torque, ticks averaged, status.
 
-use crate::{JointVector, MAX_JOINTS, csv::Table, dataset::JointLabel, gridize::Samples, input};
+use crate::{
+    JointVector, MAX_JOINTS,
+    csv::{LONGEST_LINE, Lines, Table, TableError},
+    dataset::JointLabel,
+    gridize::Samples,
+    input,
+};
 use std::{
     fmt::Write as _,
     fs::{File, OpenOptions},
-    io::{self, BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write},
+    io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
@@ -20,8 +26,7 @@ pub const SIGNATURE: &str = "# haptize scan log, version 1";
 const SCENE: &str = "#> ";
 /// After `# plan: `, where there was none but a hand's.
 const GUIDED: &str = "led by hand";
-/// Longest line and most rows that are read.
-const LONGEST_LINE: u64 = 1 << 16;
+/// Most rows that are read.
 const MOST_ROWS: usize = 5_000_000;
 
 /// How a point ended.
@@ -122,16 +127,9 @@ pub enum LogError {
     #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); \
      other tables need a column mapping (--columns)", .0.display())]
     Foreign(PathBuf),
-    /// A line that is wrong.
-    #[error("{}:{line}: {message}", .path.display())]
-    Line {
-        /// The log.
-        path: PathBuf,
-        /// From 1.
-        line: u64,
-        /// Problem, in words.
-        message: String,
-    },
+    /// The file cannot be read, or a line of it is wrong.
+    #[error(transparent)]
+    Table(#[from] TableError),
 }
 
 impl LogHeader {
@@ -239,8 +237,7 @@ impl ScanLog {
     /// Whether the file at `path` begins like a scan log.
     #[must_use]
     pub fn is_one(path: &Path) -> bool {
-        let mut start = vec![0; SIGNATURE.len()];
-        input::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == SIGNATURE.as_bytes()
+        input::begins(path, SIGNATURE.as_bytes())
     }
 
     /// Whether the file at `path` begins like the log of a simulated scan, or is empty as one that was ended before its
@@ -264,26 +261,17 @@ impl ScanLog {
 
     /// Reads `file`, which is at `path`, from where it stands.
     fn parse(path: &Path, file: impl Read) -> Result<Self, LogError> {
-        let failed = |source: io::Error| match source.kind() {
-            // Text that is none.
-            io::ErrorKind::InvalidData => LogError::Foreign(path.to_owned()),
-            _ => LogError::File { path: path.to_owned(), source },
-        };
-        let mut reader = BufReader::new(file);
+        let mut lines = Lines::new(path, BufReader::new(file));
         let mut log = Self::default();
-        let (mut text, mut number, mut has_columns) = (String::new(), 0, false);
+        let (mut text, mut has_columns) = (Vec::new(), false);
         loop {
-            text.clear();
-            let read = reader.by_ref().take(LONGEST_LINE).read_line(&mut text).map_err(failed)?;
-            if read == 0 {
-                break;
-            }
-            number += 1;
-            let line = text.trim_end_matches(['\n', '\r']);
-            let bad = |message: String| LogError::Line { path: path.to_owned(), line: number, message };
-            if number == 1 && line != SIGNATURE {
-                return Err(LogError::Foreign(path.to_owned()));
-            }
+            let line = match lines.next_text(&mut text) {
+                Ok(None) => break,
+                Ok(Some(line)) if lines.number > 1 || line == SIGNATURE => line,
+                Ok(Some(_)) | Err(TableError::Line { line: 1, .. }) => return Err(LogError::Foreign(path.to_owned())),
+                Err(error) => return Err(error.into()),
+            };
+            let bad = |message: String| lines.error(message);
             if let Some(scene) = line.strip_prefix(SCENE.trim_end()) {
                 log.header.scene += scene.strip_prefix(' ').unwrap_or(scene);
                 log.header.scene.push('\n');
@@ -298,14 +286,13 @@ impl ScanLog {
                 log.header.joints = labels(line).map_err(bad)?;
                 has_columns = true;
             } else if log.rows.len() == MOST_ROWS {
-                return Err(bad(format!("more than {MOST_ROWS} rows")));
+                return Err(bad(format!("more than {MOST_ROWS} rows")).into());
             } else {
                 log.rows.push(row(line, log.header.joints.len()).map_err(bad)?);
             }
         }
         if !has_columns {
-            let message = "the log ends before its first row".to_owned();
-            return Err(LogError::Line { path: path.to_owned(), line: number, message });
+            return Err(lines.error("the log ends before its first row").into());
         }
         Ok(log)
     }

@@ -25,7 +25,7 @@ use crate::{
     JointVector,
     dataset::JointLabel,
     proxy::{Chain, Pose},
-    scene::{JointKind, JointSpec, PlanSpec, ScanSpec},
+    scene::{JointKind, JointSpec, ScanSpec},
 };
 use glam::DVec3;
 use std::{
@@ -272,10 +272,7 @@ impl<'a> Driver<'a> {
         let period = 1.0 / control.rate;
         let reading = rig.hold(&JointVector::zeros(chain.degrees_of_freedom()), period)?;
         let ticks = (control.window * control.rate).round() as usize;
-        let node = match &spec.plan {
-            PlanSpec::Workspace(plan) => plan.node,
-            PlanSpec::Joints(_) => chain.nodes.len().saturating_sub(1),
-        };
+        let node = spec.plan.node(chain.nodes.len());
         let pd = PdControl::new(control.stiffness, control.damping, control.speed, reading.position);
         let steady = Steadiness::new(ticks, control.still, control.drift);
         Ok(Self { spec, chain, rig, control: pd, steady, pose: chain.new_pose(), node, reading, period })

@@ -44,7 +44,7 @@ impl Plan {
     /// When it has too many points, or the joints reach none of them.
     pub fn new(spec: &PlanSpec, chain: &Chain) -> Result<Self, ScanError> {
         let plan = match spec {
-            PlanSpec::Workspace(plan) => workspace(plan, chain)?,
+            PlanSpec::Workspace(plan) => workspace(plan, chain, spec.node(chain.nodes.len()))?,
             PlanSpec::Joints(grid) => {
                 let counts: Vec<usize> = grid.axes.iter().map(|axis| axis.count).collect();
                 let points = checked_points(&counts)?;
@@ -107,7 +107,7 @@ fn serpentine(counts: &[usize]) -> impl Iterator<Item = (usize, Vec<usize>)> {
     })
 }
 
-fn workspace(plan: &WorkspacePlan, chain: &Chain) -> Result<Plan, ScanError> {
+fn workspace(plan: &WorkspacePlan, chain: &Chain, node: usize) -> Result<Plan, ScanError> {
     let counts = [plan.across[0].count, plan.across[1].count];
     let depth = plan.depth;
     let points = checked_points(&[counts[0], counts[1], depth.count])?;
@@ -120,7 +120,7 @@ fn workspace(plan: &WorkspacePlan, chain: &Chain) -> Result<Plan, ScanError> {
         let offset = |axis: usize| plan.across[axis].direction * (place[axis] as f64 * plan.across[axis].spacing);
         let top = plan.start + offset(0) + offset(1);
         let mut visit = |position: DVec3, point: Option<usize>, stops: &mut Vec<Stop>| {
-            let found = reach(chain, plan.node, position, &near);
+            let found = reach(chain, node, position, &near);
             if let Some(q) = found {
                 near = q;
                 stops.push(Stop { q, point });

@@ -3,7 +3,7 @@
 use super::simulated::{Hand, NodeContact, SimulatedRig, Sponge};
 use super::*;
 use crate::proxy::inverse_kinematics::reach;
-use crate::scene::{PlanAxis, ScanScene, WorkspacePlan};
+use crate::scene::{PlanAxis, PlanSpec, ScanScene, WorkspacePlan};
 use std::path::PathBuf;
 
 fn scene() -> ScanScene {
@@ -16,7 +16,7 @@ fn scene() -> ScanScene {
 fn plan([first, second, depth]: [usize; 3], start: DVec3) -> PlanSpec {
     let axis = |direction, spacing, count| PlanAxis { direction, spacing, count };
     PlanSpec::Workspace(WorkspacePlan {
-        node: 0,
+        node: Some(0),
         start,
         across: [axis(DVec3::Y, 0.03, first), axis(DVec3::X, 0.02, second)],
         depth: axis(DVec3::NEG_Z, 0.008, depth),

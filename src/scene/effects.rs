@@ -2,7 +2,7 @@
 //! them out, for pricing them, for turning them on and off while one feels, and for proving that what is not named is
 //! not there.
 
-use super::{GraphicsEffects, HapticEffects, HapticsSpec, ProxyInertia, Scene, SceneError};
+use super::{GraphicsEffects, HapticsSpec, ProxyInertia, Scene, SceneError};
 use toml::{Table, Value};
 
 /// An effect of a loop: absent unless the scene names it.
@@ -48,7 +48,7 @@ pub const EFFECTS: [Effect; 9] = [
         name: "Contact friction",
         what: "Coulomb friction of elastic-plastic bristles at the proxy's nodes in contact: sticks, slips",
         usual: "{ coefficient = 0.4 }",
-        copy: |to, from| to.haptics.effects.friction.clone_from(&from.haptics.effects.friction),
+        copy: |to, from| to.haptics.friction = from.haptics.friction,
     },
     Effect {
         table: "haptics",
@@ -56,7 +56,7 @@ pub const EFFECTS: [Effect; 9] = [
         name: "Contact damping",
         what: "Dampers along the normals of the contacts",
         usual: "1.0",
-        copy: |to, from| to.haptics.effects.contact_damping.clone_from(&from.haptics.effects.contact_damping),
+        copy: |to, from| to.haptics.contact_damping = from.haptics.contact_damping,
     },
     Effect {
         table: "haptics",
@@ -64,7 +64,7 @@ pub const EFFECTS: [Effect; 9] = [
         name: "Four channels",
         what: "Forces and accelerations of hand and proxy are exchanged beside the coupling's spring and damper",
         usual: "{}",
-        copy: |to, from| to.haptics.effects.four_channel = from.haptics.effects.four_channel,
+        copy: |to, from| to.haptics.four_channel = from.haptics.four_channel,
     },
     Effect {
         table: "haptics",
@@ -72,7 +72,7 @@ pub const EFFECTS: [Effect; 9] = [
         name: "Passivity control",
         what: "Damping wherever the passivity observer says that energy came from nowhere",
         usual: "true",
-        copy: |to, from| to.haptics.effects.passivity_control = from.haptics.effects.passivity_control,
+        copy: |to, from| to.haptics.passivity_control = from.haptics.passivity_control,
     },
     Effect {
         table: "haptics",
@@ -166,7 +166,10 @@ impl Effect {
     pub fn leave_out(&self, tuning: &mut Tuning) {
         let plain = HapticsSpec {
             proxy_inertia: ProxyInertia::Constant,
-            effects: HapticEffects::default(),
+            friction: None,
+            contact_damping: None,
+            four_channel: None,
+            passivity_control: false,
             ..tuning.haptics.clone()
         };
         self.take_back(tuning, &Tuning { haptics: plain, graphics: GraphicsEffects::default() });

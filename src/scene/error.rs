@@ -4,6 +4,7 @@ use crate::names::is_disruptive;
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use toml::de::{DeTable, DeValue};
 
 /// Why a scene file is refused.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +45,13 @@ const EXCERPT_WIDTH: usize = 110;
 const EXCERPT_LEAD: usize = 60;
 
 impl Diagnostic {
+    /// A message about the value that `key` names in a scene's `text`, keys and numbers of entries with dots between,
+    /// or about the table around it where it is not there.
+    #[must_use]
+    pub fn at(path: &Path, text: &str, key: &str, message: impl Into<String>) -> Self {
+        Self::new(path, text, find(text, key).0, message)
+    }
+
     /// A message about the bytes `span` of `text`, the content of the file at `path`. A span beyond the text means its
     /// end.
     #[must_use]
@@ -69,6 +77,20 @@ impl Diagnostic {
             caret: (lead, width),
         }
     }
+}
+
+/// The place of what `key` names in a TOML text, keys and numbers of entries with dots between; where there is no such
+/// thing, that of the table around it, and false.
+pub(super) fn find(text: &str, key: &str) -> (Range<usize>, bool) {
+    let Ok(root) = DeTable::parse(text) else { return (0..0, false) };
+    let root = DeValue::Table(root.into_inner());
+    let (mut place, mut value) = (0..0, &root);
+    for part in key.split('.') {
+        let inner = part.parse::<usize>().map_or_else(|_| value.get(part), |number| value.get(number));
+        let Some(inner) = inner else { return (place, false) };
+        (place, value) = (inner.span(), inner.get_ref());
+    }
+    (place, true)
 }
 
 impl fmt::Display for Diagnostic {

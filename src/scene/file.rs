@@ -1,494 +1,104 @@
-//! The layout of a scene file: one struct per table, one field per key, values with their place in the text.
-//!
-//! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see
-//! [`super::convert`].
+//! The tables of a scene file, and what holds between them.
 
-use super::{Algorithm, ContactSurface, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
+use super::check::Checker;
+use super::graphics::GraphicsEntry;
+use super::grid::GridTable;
+use super::object::ObjectTable;
+use super::proxy::ProxyTable;
+use super::scan::ScanTable;
+use super::{
+    Algorithm, ContactSpec, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene,
+    Scene, SceneError, shape,
+};
+use crate::names;
 use serde::Deserialize;
-use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
-use toml::Spanned;
+use std::mem::take;
 
-pub(super) type Number = Spanned<f64>;
-pub(super) type Vector = Spanned<[f64; 3]>;
-
+/// A scene file as it is written. Unknown keys are refused with the list of the known ones.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneTable {
-    pub name: Option<Spanned<String>>,
-    pub object: Option<Spanned<ObjectTable>>,
+    pub name: Option<String>,
+    pub object: Option<ObjectTable>,
     pub proxy: ProxyTable,
-    pub contact: Option<Spanned<ContactTable>>,
-    pub grid: Option<Spanned<GridTable>>,
-    pub scan: Option<Spanned<ScanTable>>,
+    pub contact: Option<ContactSpec>,
+    pub grid: Option<GridTable>,
+    pub scan: Option<ScanTable>,
     #[serde(default)]
-    pub haptics: HapticsTable,
+    pub haptics: HapticsSpec,
     pub graphics: Option<GraphicsEntry>,
     #[serde(default)]
-    pub motion: MotionTable,
+    pub motion: MotionSpec,
     #[serde(default)]
-    pub device: DeviceTable,
+    pub device: DeviceSpec,
 }
 
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct DeviceTable {
-    pub map: Option<Spanned<Vec<Vec<f64>>>>,
-    pub offset: Option<Spanned<Vec<f64>>>,
-    pub node: Option<Spanned<usize>>,
-    pub stiffness: Option<Number>,
-    pub damping: Option<Number>,
-    pub effort_limit: Option<Spanned<Vec<f64>>>,
+/// Validates `table`, read from the checker's text, as a scene with a virtual object.
+pub(super) fn scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<Scene, SceneError> {
+    let rendering = rendering(checker, &mut table)?;
+    let (Some(object), Some(mut contact)) = (rendering.object, table.contact) else {
+        let message = "the scene needs [object] and [contact] to be baked; a scene of a real object, with [scan], is \
+                       haptized by `haptize scan`";
+        return Err(checker.error(0..0, message));
+    };
+    let Rendering { path, text, name, proxy, haptics, graphics, motion, .. } = rendering;
+    let grid = table.grid.map(|grid| grid.check(checker, "grid", &proxy.joints)).transpose()?.unwrap_or_default();
+    contact.check(checker, &proxy)?;
+    Ok(Scene { path, text, name, object, contact, grid, haptics, graphics, motion, proxy })
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ObjectTable {
-    pub sphere: Option<SphereTable>,
-    pub mesh: Option<MeshTable>,
-    pub tetrahedra: Option<MeshTable>,
-    pub springs: Option<Spanned<SpringsTable>>,
-    pub elasticity: Option<Spanned<ElasticityTable>>,
-    pub skin: Option<Spanned<SkinTable>>,
-    pub ground: Option<GroundTable>,
-    pub node_mass: Option<Number>,
-    pub node_damping: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SphereTable {
-    pub centre: Option<Vector>,
-    pub radius: Number,
-    pub rings: Option<Spanned<usize>>,
-    pub segments: Option<Spanned<usize>>,
-    pub subdivisions: Option<Spanned<usize>>,
-    pub edge: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct MeshTable {
-    pub file: Spanned<String>,
-    pub scale: Option<Number>,
-    pub centre: Option<Vector>,
-    pub refine: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SpringsTable {
-    pub kind: SpringKind,
-    pub stiffness: Number,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ElasticityTable {
-    pub young: Number,
-    pub poisson: Number,
-    pub cell: Option<Number>,
-    #[serde(default)]
-    pub inclusion: Vec<Spanned<InclusionTable>>,
-}
-
-/// A part of the solid, by a sphere or by the number of a physical volume.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct InclusionTable {
-    pub sphere: Option<InclusionSphereTable>,
-    pub region: Option<Spanned<u32>>,
-    pub young: Number,
-    pub poisson: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct InclusionSphereTable {
-    pub centre: Vector,
-    pub radius: Number,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SkinTable {
-    pub tension: Option<Number>,
-    pub bending: Option<Number>,
-    pub width: Option<Number>,
-    pub thickness: Option<Number>,
-    pub young: Option<Number>,
-    pub poisson: Option<Number>,
-    pub foundation: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GroundTable {
-    pub stiffness: Number,
-    pub nodes: Option<Spanned<Vec<u32>>>,
-    pub below: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ProxyTable {
-    pub joint: Spanned<Vec<JointTable>>,
-    #[serde(default)]
-    pub shape: Vec<Spanned<ShapeTable>>,
-}
-
-/// One of four forms, drawn with the link of a joint.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ShapeTable {
-    pub joint: Option<Spanned<String>>,
-    #[serde(rename = "box")]
-    pub block: Option<Vector>,
-    pub cylinder: Option<CylinderTable>,
-    pub sphere: Option<Number>,
-    pub surface: Option<LinkSurfaceTable>,
-    pub at: Option<Vector>,
-    pub turn: Option<Vector>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CylinderTable {
-    pub radius: Number,
-    pub length: Number,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LinkSurfaceTable {
-    pub from: Vector,
-    pub to: Vector,
-    pub data: Spanned<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct JointTable {
-    pub name: Option<Spanned<String>>,
-    pub kind: JointKind,
-    pub origin: Option<Vector>,
-    pub axis: Vector,
-    pub limits: Spanned<[f64; 2]>,
-    pub mass: Option<Number>,
-    pub centre_of_mass: Option<Vector>,
-    pub inertia: Option<Spanned<Vec<f64>>>,
-    pub rotor_inertia: Option<Number>,
-    #[serde(default)]
-    pub nodes: Vec<Spanned<NodesTable>>,
-}
-
-/// One node `at` a point, or nodes on the line `from` .. `to`, both ends included: `count` of them, or at most
-/// `spacing` apart.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct NodesTable {
-    pub at: Option<Vector>,
-    pub from: Option<Vector>,
-    pub to: Option<Vector>,
-    pub count: Option<Spanned<usize>>,
-    pub spacing: Option<Number>,
-    pub radius: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ContactTable {
-    pub stiffness: Option<Spanned<NumberOr<Rigid>>>,
-    pub stiffness_per_length: Option<Number>,
-    pub algorithm: Option<Algorithm>,
-    pub tolerance: Option<Number>,
-    pub max_iterations: Option<Spanned<u32>>,
-    pub updates: Option<Spanned<u32>>,
-    pub surface: Option<Spanned<ContactSurface>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GridTable {
-    pub spacing: Option<Number>,
-    pub axes: Option<Spanned<Vec<Spanned<AxisTable>>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct AxisTable {
-    pub start: Option<Number>,
-    pub stop: Option<Number>,
-    pub step: Option<Number>,
-    pub count: Option<Spanned<usize>>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct HapticsTable {
-    pub rate: Option<Number>,
-    pub threshold: Option<Number>,
-    pub interpolation: Option<Interpolation>,
-    pub boundary_slope: Option<Spanned<PerJoint>>,
-    pub passivity_factor: Option<Number>,
-    pub proxy_damping: Option<Spanned<PerJoint>>,
-    pub proxy_inertia: Option<ProxyInertia>,
-    pub coupling_stiffness: Option<Spanned<PerJoint>>,
-    pub coupling_damping: Option<Spanned<PerJoint>>,
-    pub device_damping: Option<Spanned<PerJoint>>,
-    pub device_inertia: Option<Spanned<PerJoint>>,
-    pub torque_limit: Option<Spanned<PerJoint>>,
-    pub torque_rate_limit: Option<Spanned<PerJoint>>,
-    pub speed_limit: Option<Spanned<PerJoint>>,
-    pub encoder_step: Option<Spanned<PerJoint>>,
-    pub device_friction: Option<Spanned<PerJoint>>,
-    pub friction: Option<Spanned<FrictionTable>>,
-    pub contact_damping: Option<Number>,
-    pub four_channel: Option<FourChannelTable>,
-    pub passivity_control: Option<bool>,
-    #[serde(default)]
-    pub hand: HandTable,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct FrictionTable {
-    pub coefficient: Number,
-    pub static_coefficient: Option<Number>,
-    pub stiffness: Option<Number>,
-    pub damping: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct FourChannelTable {
-    pub channels: Option<Spanned<[f64; 4]>>,
-    pub filter: Option<Number>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct HandTable {
-    pub stiffness: Option<Spanned<PerJoint>>,
-    pub damping: Option<Spanned<PerJoint>>,
-    pub inertia: Option<Spanned<PerJoint>>,
-}
-
-/// The graphics loop, or `false` for none.
-pub(super) enum GraphicsEntry {
-    Off,
-    Loop(Box<GraphicsTable>),
-}
-
-impl<'de> Deserialize<'de> for GraphicsEntry {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct FalseOrTable;
-
-        impl<'de> Visitor<'de> for FalseOrTable {
-            type Value = GraphicsEntry;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("the table [graphics], or false")
-            }
-
-            fn visit_bool<E: serde::de::Error>(self, value: bool) -> Result<GraphicsEntry, E> {
-                if value {
-                    return Err(E::invalid_value(serde::de::Unexpected::Bool(true), &self));
-                }
-                Ok(GraphicsEntry::Off)
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<GraphicsEntry, A::Error> {
-                GraphicsTable::deserialize(MapAccessDeserializer::new(map))
-                    .map(|table| GraphicsEntry::Loop(Box::new(table)))
-            }
-        }
-
-        deserializer.deserialize_any(FalseOrTable)
+/// Validates `table` as a scene with a real object.
+pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<ScanScene, SceneError> {
+    let Some(scan) = table.scan.take() else {
+        let message = "the scene has no [scan]: it says nothing of how a real object is haptized; a virtual one is \
+                       haptized by `haptize bake`";
+        return Err(checker.error(0..0, message));
+    };
+    let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, &mut table)?;
+    if let Some(effect) = haptics.at_contacts() {
+        let message = format!("{effect} needs the contact forces, which a real object does not tell: leave it out");
+        return Err(checker.at(&format!("haptics.{effect}"), message));
     }
+    Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }
 
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct GraphicsTable {
-    pub rate: Option<Number>,
-    pub gravity: Option<Vector>,
-    pub stiffening: Option<Spanned<StiffeningTable>>,
-    pub smoothing: Option<Number>,
-    pub quasi_static: Option<Spanned<bool>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct StiffeningTable {
-    pub factor: Number,
-    pub strain: Number,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct MotionTable {
-    pub press: Option<Spanned<Vec<WaypointTable>>>,
-    pub scrape: Option<Spanned<Vec<WaypointTable>>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct WaypointTable {
-    pub time: Number,
-    pub q: Spanned<Vec<f64>>,
-}
-
-/// Haptization of a real object.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ScanTable {
-    pub workspace: Option<WorkspaceTable>,
-    pub joints: Option<Spanned<GridTable>>,
-    #[serde(default)]
-    pub control: ControlTable,
-    pub limits: LimitsTable,
-    pub simulated: SimulatedTable,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct WorkspaceTable {
-    pub node: Option<Spanned<usize>>,
-    pub start: Vector,
-    pub across: Spanned<Vec<PlanAxisTable>>,
-    pub depth: PlanAxisTable,
-    pub clearance: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct PlanAxisTable {
-    pub direction: Vector,
-    pub spacing: Number,
-    pub count: Spanned<usize>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ControlTable {
-    pub rate: Option<Number>,
-    pub stiffness: Option<Spanned<PerJoint>>,
-    pub damping: Option<Spanned<PerJoint>>,
-    pub speed: Option<Number>,
-    pub window: Option<Number>,
-    pub still: Option<Number>,
-    pub drift: Option<Number>,
-    pub timeout: Option<Number>,
-    pub average: Option<Number>,
-    pub epsilon: Option<Number>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LimitsTable {
-    pub torque: Option<Spanned<PerJoint>>,
-    pub speed: Option<Number>,
-    pub workspace: Spanned<[[f64; 3]; 2]>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct SimulatedTable {
-    pub corner: Vector,
-    pub size: Vector,
-    pub cover: Option<Cover>,
-    pub friction: Option<Number>,
-    pub encoder: Option<Number>,
-    pub noise: Option<Number>,
-    pub joint_friction: Option<Number>,
-}
-
-/// A number, or one word instead.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum NumberOr<W> {
-    Number(f64),
-    Word(W),
-}
-
-/// A word that may stand instead of a number.
-pub(super) trait Word: Default {
-    const WORD: &'static str;
-}
-
-/// Contact as stiff as makes no difference.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Rigid;
-
-impl Word for Rigid {
-    const WORD: &'static str = "rigid";
-}
-
-impl<'de, W: Word> Deserialize<'de> for NumberOr<W> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Visit<W>(std::marker::PhantomData<W>);
-
-        impl<W: Word> Visitor<'_> for Visit<W> {
-            type Value = NumberOr<W>;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                write!(f, "a number or {:?}", W::WORD)
-            }
-
-            fn visit_f64<E>(self, value: f64) -> Result<Self::Value, E> {
-                Ok(NumberOr::Number(value))
-            }
-
-            fn visit_i64<E>(self, value: i64) -> Result<Self::Value, E> {
-                Ok(NumberOr::Number(value as f64))
-            }
-
-            fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<Self::Value, E> {
-                if value == W::WORD {
-                    return Ok(NumberOr::Word(W::default()));
-                }
-                Err(E::invalid_value(serde::de::Unexpected::Str(value), &self))
-            }
-        }
-
-        deserializer.deserialize_any(Visit(std::marker::PhantomData))
+/// Validates what rendering needs of `table`, and takes it.
+pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result<Rendering, SceneError> {
+    let proxy = table.proxy.check(checker)?;
+    let joints = &proxy.joints;
+    let object = take(&mut table.object).map(|object| object.check(checker)).transpose()?;
+    // A virtual object is drawn unless the scene says no; a real one moves by no forces that are known.
+    let graphics = match table.graphics {
+        Some(GraphicsEntry::Loop(graphics)) => Some(graphics),
+        None => object.is_some().then(GraphicsSpec::default),
+        Some(GraphicsEntry::Off) => None,
+    };
+    graphics.map_or(Ok(()), |graphics| graphics.check(checker, object.as_ref()))?;
+    let mut haptics = take(&mut table.haptics);
+    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
+    // energy.
+    let solved = table.contact.is_some_and(|contact| contact.algorithm != Algorithm::Paper);
+    if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
+        haptics.interpolation = Interpolation::Linear;
     }
-}
-
-/// One number for all joints, or a list with one for each.
-#[derive(Debug, PartialEq)]
-pub(super) enum PerJoint {
-    Same(f64),
-    Each(Vec<f64>),
-}
-
-impl<'de> Deserialize<'de> for PerJoint {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct NumberOrList;
-
-        impl<'de> Visitor<'de> for NumberOrList {
-            type Value = PerJoint;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("a number, or a list of one number per joint")
-            }
-
-            fn visit_f64<E>(self, value: f64) -> Result<PerJoint, E> {
-                Ok(PerJoint::Same(value))
-            }
-
-            fn visit_i64<E>(self, value: i64) -> Result<PerJoint, E> {
-                Ok(PerJoint::Same(value as f64))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<PerJoint, A::Error> {
-                let mut values = Vec::new();
-                while let Some(value) = list.next_element()? {
-                    values.push(value);
-                }
-                Ok(PerJoint::Each(values))
-            }
-        }
-
-        deserializer.deserialize_any(NumberOrList)
+    haptics.check(checker, joints)?;
+    let (motion, device) = (take(&mut table.motion), take(&mut table.device));
+    motion.check(checker, joints)?;
+    device.check(checker, &proxy)?;
+    if let Some(name) = &table.name {
+        names::check(name).map_err(|why| checker.at("name", why))?;
     }
+    let file_stem = checker.path.file_stem().map(|stem| names::escaped(&stem.to_string_lossy()).into_owned());
+    Ok(Rendering {
+        path: checker.path.to_owned(),
+        text: checker.text.to_owned(),
+        name: take(&mut table.name).or(file_stem).unwrap_or_default(),
+        object,
+        haptics,
+        graphics,
+        motion,
+        device,
+        shapes: shape::check(checker, take(&mut table.proxy.shape), joints)?,
+        proxy,
+    })
 }

@@ -1,15 +1,16 @@
 //! Gains of the loop in the place of a scene's: what a program that drives its own device may change without a new
 //! scene.
 
-use super::HapticsSpec;
+use super::{BOUNDARY_SLOPE, HapticsSpec, JointKind, LEVER_ARM};
 use crate::JointVector;
+use Quantity::{Gain, Speed, Torque};
 
 /// A gain that cannot be taken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GainError {
     /// No gain of that name.
-    #[error("there is no gain {key:?}: take one of {}", GAINS.map(|(key, ..)| key).join(", "))]
+    #[error("there is no gain {key:?}: take one of {}", GAINS.map(|((key, ..), _)| key).join(", "))]
     Unknown {
         /// The name that was given.
         key: String,
@@ -36,18 +37,55 @@ pub enum GainError {
     },
 }
 
-type List = fn(&mut HapticsSpec) -> &mut JointVector;
+/// How a default changes from joints that turn to joints that slide, by a lever arm of 0.1 m.
+#[derive(Clone, Copy)]
+pub(super) enum Quantity {
+    /// Stiffness, damping, inertia: over the square of the arm.
+    Gain(f64),
+    /// Torque and its rate: over the arm.
+    Torque(f64),
+    /// Times the arm.
+    Speed(f64),
+}
 
-/// Key in `[haptics]`, list, and whether zero may stand in it.
-const GAINS: [(&str, List, bool); 8] = [
-    ("boundary_slope", |spec| &mut spec.boundary_slope, false),
-    ("coupling_damping", |spec| &mut spec.coupling_damping, true),
-    ("coupling_stiffness", |spec| &mut spec.coupling_stiffness, false),
-    ("device_damping", |spec| &mut spec.device_damping, true),
-    ("proxy_damping", |spec| &mut spec.proxy_damping, true),
-    ("speed_limit", |spec| &mut spec.speed_limit, false),
-    ("torque_limit", |spec| &mut spec.torque_limit, false),
-    ("torque_rate_limit", |spec| &mut spec.torque_rate_limit, false),
+impl Quantity {
+    pub fn of(self, kind: JointKind) -> f64 {
+        match (self, kind) {
+            (Self::Gain(value) | Self::Torque(value) | Self::Speed(value), JointKind::Revolute) => value,
+            (Self::Gain(value), JointKind::Prismatic) => value / (LEVER_ARM * LEVER_ARM),
+            (Self::Torque(value), JointKind::Prismatic) => value / LEVER_ARM,
+            (Self::Speed(value), JointKind::Prismatic) => value * LEVER_ARM,
+        }
+    }
+}
+
+/// Key in its table of the scene, list, and default of a joint that turns.
+pub(super) type List = (&'static str, fn(&mut HapticsSpec) -> &mut JointVector, Quantity);
+
+/// The lists of `[haptics]` that programs may change, and whether zero may stand in them.
+pub(super) const GAINS: [(List, bool); 8] = [
+    (("boundary_slope", |spec| &mut spec.boundary_slope, Gain(BOUNDARY_SLOPE)), false),
+    (("coupling_damping", |spec| &mut spec.coupling_damping, Gain(0.01)), true),
+    (("coupling_stiffness", |spec| &mut spec.coupling_stiffness, Gain(20.0)), false),
+    (("device_damping", |spec| &mut spec.device_damping, Gain(0.03)), true),
+    (("proxy_damping", |spec| &mut spec.proxy_damping, Gain(0.02)), true),
+    (("speed_limit", |spec| &mut spec.speed_limit, Speed(50.0)), false),
+    (("torque_limit", |spec| &mut spec.torque_limit, Torque(1.5)), false),
+    (("torque_rate_limit", |spec| &mut spec.torque_rate_limit, Torque(500.0)), false),
+];
+
+/// The other lists of `[haptics]`.
+pub(super) const OF_THE_DEVICE: [List; 3] = [
+    ("device_inertia", |spec| &mut spec.device_inertia, Gain(1e-3)),
+    ("encoder_step", |spec| &mut spec.encoder_step, Torque(0.0)),
+    ("device_friction", |spec| &mut spec.device_friction, Torque(0.0)),
+];
+
+/// The lists of `[haptics.hand]`.
+pub(super) const OF_THE_HAND: [List; 3] = [
+    ("stiffness", |spec| &mut spec.hand.stiffness, Gain(20.0)),
+    ("damping", |spec| &mut spec.hand.damping, Gain(0.4)),
+    ("inertia", |spec| &mut spec.hand.inertia, Gain(2e-3)),
 ];
 
 impl HapticsSpec {
@@ -56,8 +94,8 @@ impl HapticsSpec {
     /// # Errors
     /// When there is no such gain, the numbers do not fit, or one is out of its range; nothing is taken then.
     pub fn set_gain(&mut self, key: &str, values: &[f64]) -> Result<(), GainError> {
-        let found = GAINS.into_iter().find(|(name, ..)| *name == key);
-        let (key, list, zero) = found.ok_or_else(|| GainError::Unknown { key: key.into() })?;
+        let found = GAINS.into_iter().find(|((name, ..), _)| *name == key);
+        let ((key, list, _), zero) = found.ok_or_else(|| GainError::Unknown { key: key.into() })?;
         let (gains, found) = (list(self), values.len());
         let joints = gains.len();
         if found != 1 && found != joints {
@@ -80,7 +118,7 @@ mod tests {
     #[test]
     fn a_gain_is_taken_whole_or_not_at_all() {
         let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
-        for (key, list, zero) in GAINS {
+        for ((key, list, _), zero) in GAINS {
             let mut spec = scene.haptics.clone();
             spec.set_gain(key, &[2.5]).unwrap();
             assert_eq!(**list(&mut spec), [2.5; 3], "{key}");

@@ -4,34 +4,48 @@
 //! file, the line and the remedy. All quantities are SI: metres, radians, newtons, kilograms, seconds.
 
 mod check;
-mod convert;
+mod contact;
 mod device;
 mod effects;
 mod effort;
 mod error;
 mod file;
 mod gains;
+mod graphics;
+mod grid;
+mod haptics;
 mod inertia;
+mod motion;
+mod object;
 mod own_text;
+mod proxy;
 mod scan;
 mod shape;
-mod spec;
+mod skin;
 pub(crate) mod text;
+mod value;
 
+pub use contact::{Algorithm, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{arm_note, effort_norms, effort_unit, efforts, lever_arm};
 pub use error::{Diagnostic, SceneError};
 pub use gains::GainError;
+pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};
+pub use grid::{AxisSpec, GRID_LINE, GRID_STEP_SLACK, GridSpec};
+pub use haptics::{
+    BOUNDARY_SLOPE, FourChannelSpec, FrictionSpec, GREATEST_INTERVAL, HandSpec, HapticsSpec, Interpolation, LEVER_ARM,
+    ProxyInertia, THRESHOLD,
+};
+pub use motion::{MotionSpec, Waypoint};
+pub use object::{
+    ElasticSpec, GroundNodes, GroundSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape, SpringKind,
+    SpringSpec,
+};
+pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
-pub use spec::{
-    Algorithm, AxisSpec, BOUNDARY_SLOPE, ContactDampingSpec, ContactSpec, ContactSurface, ElasticSpec, FourChannelSpec,
-    FrictionSpec, GREATEST_INTERVAL, GRID_LINE, GRID_STEP_SLACK, GraphicsEffects, GraphicsSpec, GridSpec, GroundNodes,
-    GroundSpec, HandSpec, HapticEffects, HapticsSpec, InclusionPlace, InclusionSpec, Interpolation, JointKind,
-    JointSpec, LEVER_ARM, MAX_CONTACT_NODES, Material, MotionSpec, ObjectSpec, ProxyInertia, ProxyNodeSpec, ProxySpec,
-    Shape, SkinSpec, SpringKind, SpringSpec, StiffeningSpec, THRESHOLD, Waypoint,
-};
+pub use skin::SkinSpec;
 
 pub(crate) use inertia::positive_semidefinite;
 
@@ -112,15 +126,15 @@ impl Scene {
     pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let text = read_text(path)?;
-        let (checker, table) = table(&text, path)?;
-        let scene = convert::scene(&checker, &table)?;
-        let object = table.object.as_ref().map(toml::Spanned::get_ref);
-        let mesh = object.and_then(|object| object.mesh.as_ref().or(object.tetrahedra.as_ref()));
-        if let (Shape::Mesh { file, .. } | Shape::Tetrahedra { file, .. }, Some(mesh)) = (&scene.object.shape, mesh)
-            && let Err(error) = std::fs::metadata(file)
-        {
+        let scene = Self::parse(&text, path)?;
+        let (file, place) = match &scene.object.shape {
+            Shape::Mesh { file, .. } => (file, "object.mesh.file"),
+            Shape::Tetrahedra { file, .. } => (file, "object.tetrahedra.file"),
+            Shape::Sphere { .. } | Shape::Icosphere { .. } => return Ok(scene),
+        };
+        if let Err(error) = std::fs::metadata(file) {
             let message = format!("the mesh file {} cannot be opened: {error}", file.display());
-            return Err(checker.error(mesh.file.span(), message));
+            return Err(Checker { path, text: &text }.at(place, message));
         }
         Ok(scene)
     }
@@ -138,8 +152,8 @@ impl Scene {
     /// # Errors
     /// When the scene is not valid; the message names the line and the remedy.
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
-        let (checker, table) = table(text, path.as_ref())?;
-        convert::scene(&checker, &table)
+        let checker = Checker { path: path.as_ref(), text };
+        file::scene(&checker, checker.read()?)
     }
 }
 
@@ -158,8 +172,8 @@ impl ScanScene {
     /// # Errors
     /// When the scene has no valid `[scan]`; the message names the line and the remedy.
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
-        let (checker, table) = table(text, path.as_ref())?;
-        convert::scan_scene(&checker, &table)
+        let checker = Checker { path: path.as_ref(), text };
+        file::scan_scene(&checker, checker.read()?)
     }
 }
 
@@ -178,22 +192,12 @@ impl Rendering {
     /// # Errors
     /// When the scene is not valid; the message names the line and the remedy.
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
-        let (checker, table) = table(text, path.as_ref())?;
-        convert::rendering(&checker, &table)
+        let checker = Checker { path: path.as_ref(), text };
+        file::rendering(&checker, &mut checker.read()?)
     }
 }
 
 /// The text of the scene file at `path`.
 fn read_text(path: &Path) -> Result<String, SceneError> {
     text::read(path).map_err(|reason| SceneError::Unreadable { path: path.to_owned(), reason })
-}
-
-/// The tables of a scene's text, checked for layout alone.
-fn table<'a>(text: &'a str, path: &'a Path) -> Result<(Checker<'a>, file::SceneTable), SceneError> {
-    let checker = Checker { path, text };
-    let table: file::SceneTable = toml::from_str(text).map_err(|error| {
-        let place = error.span().unwrap_or(0..0);
-        checker.error(place, error.message())
-    })?;
-    Ok((checker, table))
 }

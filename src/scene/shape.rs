@@ -1,7 +1,10 @@
 //! Shapes of links: drawn, not felt. Nothing that is solved depends on them.
 
+use super::check::Checker;
+use super::value::{edges, positive, vector};
+use super::{JointSpec, SceneError};
 use base64::{Engine, engine::general_purpose::STANDARD};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DQuat, DVec3, EulerRot};
 
 /// Most shapes of an arm.
 pub const MAX_SHAPES: usize = 512;
@@ -46,7 +49,8 @@ pub enum LinkForm {
 }
 
 /// Triangles, as a mesh file gave them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Deserialize)]
+#[serde(try_from = "SurfaceTable")]
 pub struct LinkSurface {
     /// (m)
     pub nodes: Vec<DVec3>,
@@ -104,6 +108,90 @@ impl LinkSurface {
             Some(node) => Err(format!("a triangle names node {node} of {nodes}")),
             None => Ok(surface),
         }
+    }
+}
+
+/// `[[proxy.shape]]` as it is written: one of four forms, drawn with the link of a joint.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ShapeTable {
+    joint: Option<String>,
+    #[serde(default, rename = "box", deserialize_with = "edges")]
+    block: Option<DVec3>,
+    cylinder: Option<CylinderTable>,
+    #[serde(default, deserialize_with = "positive")]
+    sphere: Option<f64>,
+    surface: Option<LinkSurface>,
+    #[serde(default, deserialize_with = "vector")]
+    at: DVec3,
+    #[serde(default, deserialize_with = "vector")]
+    turn: DVec3,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CylinderTable {
+    #[serde(deserialize_with = "positive")]
+    radius: f64,
+    #[serde(deserialize_with = "positive")]
+    length: f64,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SurfaceTable {
+    #[serde(deserialize_with = "vector")]
+    from: DVec3,
+    #[serde(deserialize_with = "vector")]
+    to: DVec3,
+    data: String,
+}
+
+impl TryFrom<SurfaceTable> for LinkSurface {
+    type Error = String;
+
+    fn try_from(SurfaceTable { from, to, data }: SurfaceTable) -> Result<Self, String> {
+        let again = |what| format!("the surface cannot be read, {what}: import the robot again");
+        Self::decode(&data, [from, to]).map_err(again)
+    }
+}
+
+/// The shapes of an arm with `joints`.
+pub(super) fn check(
+    checker: &Checker<'_>,
+    tables: Vec<ShapeTable>,
+    joints: &[JointSpec],
+) -> Result<Vec<LinkShape>, SceneError> {
+    if tables.len() > MAX_SHAPES {
+        let message = format!("the arm has more than {MAX_SHAPES} shapes: leave some out");
+        return Err(checker.at(&format!("proxy.shape.{MAX_SHAPES}"), message));
+    }
+    let shapes = tables.into_iter().enumerate();
+    shapes.map(|(number, table)| table.check(checker, &format!("proxy.shape.{number}"), joints)).collect()
+}
+
+impl ShapeTable {
+    fn check(self, checker: &Checker<'_>, path: &str, joints: &[JointSpec]) -> Result<LinkShape, SceneError> {
+        let number = |name: String| {
+            joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
+                let names: Vec<&str> = joints.iter().map(|joint| joint.name.as_str()).collect();
+                let message = format!("there is no joint {name:?}: name one of {}", names.join(", "));
+                checker.at(&format!("{path}.joint"), message)
+            })
+        };
+        let joint = self.joint.map(number).transpose()?;
+        let form = match (self.block, self.cylinder, self.sphere, self.surface) {
+            (Some(edges), None, None, None) => LinkForm::Box(edges),
+            (None, Some(CylinderTable { radius, length }), None, None) => LinkForm::Cylinder { radius, length },
+            (None, None, Some(radius), None) => LinkForm::Sphere(radius),
+            (None, None, None, Some(surface)) => LinkForm::Surface(surface),
+            _ => {
+                let message = "a shape is one of box, cylinder, sphere and surface: give one of them";
+                return Err(checker.at(path, message));
+            }
+        };
+        let rotation = DQuat::from_euler(EulerRot::ZYX, self.turn.z, self.turn.y, self.turn.x);
+        Ok(LinkShape { joint, place: DAffine3::from_rotation_translation(rotation, self.at), form })
     }
 }
 

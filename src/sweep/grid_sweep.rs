@@ -124,7 +124,7 @@ impl<'a> Sweep<'a> {
                 joints: grid.joints(),
                 surface_nodes: object.surface_nodes,
                 with_forces,
-                with_touches: scene.haptics.effects.at_contacts().is_some(),
+                with_touches: scene.haptics.at_contacts().is_some(),
                 with_tangent: false,
             },
             with_forces,

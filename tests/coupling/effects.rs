@@ -114,7 +114,7 @@ fn effects_that_are_not_named_do_not_exist() {
     ];
     assert_eq!(booked, [0.0; 5]);
     // Contact forces are stored for those who need them only.
-    let parse = |text: &str| Rendering::parse(text, "scene").unwrap().haptics.effects.at_contacts().is_some();
+    let parse = |text: &str| Rendering::parse(text, "scene").unwrap().haptics.at_contacts().is_some();
     assert!(!parse(&super::block::scene("[haptics]\npassivity_control = true\nfour_channel = {}")));
     assert!(parse(&super::block::scene(FRICTION)) && parse(&super::block::scene("[haptics]\ncontact_damping = 1.0")));
 }

@@ -5,7 +5,7 @@
 use haptize::{
     JointVector, MAX_JOINTS,
     render::npmi::Npmi,
-    scene::{HandSpec, HapticEffects, HapticsSpec, Interpolation, ProxyInertia},
+    scene::{HandSpec, HapticsSpec, Interpolation, ProxyInertia},
 };
 
 /// Gains of a desktop device, alike at all `joints`.
@@ -29,7 +29,10 @@ pub fn haptics(joints: usize) -> HapticsSpec {
         speed_limit: all(50.0),
         encoder_step: all(0.0),
         device_friction: all(0.0),
-        effects: HapticEffects::default(),
+        friction: None,
+        contact_damping: None,
+        four_channel: None,
+        passivity_control: false,
         hand: HandSpec { stiffness: all(20.0), damping: all(0.2), inertia: all(2e-3) },
     }
 }

@@ -60,7 +60,7 @@ impl Friction {
     pub fn new(spec: &FrictionSpec) -> Self {
         Self {
             kinetic: spec.coefficient,
-            stiction: spec.static_coefficient,
+            stiction: spec.static_coefficient.unwrap_or(spec.coefficient),
             stiffness: spec.stiffness,
             damping: spec.damping,
         }

@@ -19,7 +19,7 @@ use crate::{
     dataset::Dataset,
     field::stencil::LatticeError,
     proxy::{Chain, JointMatrix},
-    scene::{Diagnostic, HapticEffects},
+    scene::{Diagnostic, HapticsSpec},
 };
 use contacts::Touch;
 use glam::DVec3;
@@ -108,13 +108,13 @@ impl ContactEffects {
     /// # Errors
     /// When the dataset lacks the contact forces.
     pub fn new(
-        spec: &HapticEffects,
+        spec: &HapticsSpec,
         (dataset, explored): (&Dataset, bool),
         chain: &Chain,
         text: &str,
         path: &Path,
     ) -> Result<Option<Self>, EffectError> {
-        let Some((name, place)) = spec.at_contacts() else { return Ok(None) };
+        let Some(name) = spec.at_contacts() else { return Ok(None) };
         let stored = || Contacts::new(dataset, chain.nodes.len());
         let contacts = if explored { Some(Contacts::Solved) } else { stored()? };
         let contacts = contacts.ok_or_else(|| {
@@ -127,13 +127,13 @@ impl ContactEffects {
             };
             let message =
                 format!("{name} needs the contact forces on this proxy, which the dataset does not hold: {remedy}");
-            Diagnostic::new(path, text, place.clone(), message)
+            Diagnostic::at(path, text, &format!("haptics.{name}"), message)
         })?;
         Ok(Some(Self {
             chain: chain.clone(),
             contacts,
             friction: spec.friction.as_ref().map(Friction::new),
-            damping: spec.contact_damping.as_ref().map_or(0.0, |damping| damping.damping),
+            damping: spec.contact_damping.unwrap_or(0.0),
         }))
     }
 

@@ -16,7 +16,7 @@ use crate::{
         raster::{Camera, Finish, Raster, Vertex},
         ticks,
     },
-    scene::{PlanSpec, SpecimenSpec},
+    scene::SpecimenSpec,
 };
 use glam::DVec3;
 
@@ -59,10 +59,7 @@ fn picture(scanned: Scanned<'_>) -> Picture {
     let block = scanned.scene.scan.simulated;
     let chain = scanned.chain;
     let mut pose = chain.new_pose();
-    let node = match &scanned.scene.scan.plan {
-        PlanSpec::Workspace(plan) => plan.node,
-        PlanSpec::Joints(_) => chain.nodes.len().saturating_sub(1),
-    };
+    let node = scanned.scene.scan.plan.node(chain.nodes.len());
     let mut visited = |q: &[f64]| {
         chain.pose(&JointVector::from_slice(q), &mut pose);
         pose.nodes[node]

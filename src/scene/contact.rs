@@ -1,0 +1,185 @@
+//! `[contact]`: equation (2) and how it is solved.
+
+use super::check::Checker;
+use super::value::{KEY, Range, defaults, positive, share};
+use super::{ProxySpec, SceneError};
+use serde::de::{Deserialize, Deserializer, Error};
+
+/// Most updates of linearised contact (1): far more than where it settles, and still milliseconds for a configuration.
+const MAX_UPDATES: u32 = 1000;
+
+/// Equation (2) and how it is solved.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactSpec {
+    /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
+    /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a
+    /// stiffness per length instead, that of a node that stands for the mean length; [`ContactSpec::node_stiffness`]
+    /// gives each node's own (N/m).
+    #[serde(default, deserialize_with = "number_or_rigid")]
+    pub stiffness: f64,
+    /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that (N/m^2).
+    #[serde(default, deserialize_with = "positive")]
+    pub stiffness_per_length: Option<f64>,
+    /// How equation (2) is solved.
+    #[serde(default)]
+    pub algorithm: Algorithm,
+    /// Relative residual at which a configuration counts as converged (1).
+    #[serde(default = "tolerance", deserialize_with = "share")]
+    pub tolerance: f64,
+    /// After as many a configuration that has not converged is flagged.
+    #[serde(default = "max_iterations", deserialize_with = "at_least_one")]
+    pub max_iterations: u32,
+    /// How often linearised contact updates its geometry, at the displacement found.
+    #[serde(default, deserialize_with = "updates")]
+    pub updates: u32,
+    /// Which surface the proxy feels.
+    #[serde(default)]
+    pub surface: ContactSurface,
+}
+
+/// Which surface of a mesh the proxy feels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ContactSurface {
+    /// The triangles.
+    Facets,
+    /// A smooth surface through the mesh's nodes: the limit of Loop's subdivision.
+    #[default]
+    Smooth,
+}
+
+impl ContactSpec {
+    /// The surface that the algorithm feels: the paper's iteration is defined on facets.
+    #[must_use]
+    pub fn felt_surface(&self) -> ContactSurface {
+        if self.algorithm == Algorithm::Paper { ContactSurface::Facets } else { self.surface }
+    }
+
+    /// Returns Kc of a node that stands for `length` of a link (m), in (N/m): with a stiffness per length k' the third
+    /// part of k' times the length, so that the contact point's kc = 3 Kc is k' times the length, and the whole link's
+    /// does not depend on the number of its nodes.
+    #[must_use]
+    pub fn node_stiffness(&self, length: f64) -> f64 {
+        match self.stiffness_per_length {
+            Some(per_length) if length > 0.0 => per_length * length / 3.0,
+            _ => self.stiffness,
+        }
+    }
+
+    /// The same over [`ContactSpec::stiffness`] (1).
+    #[must_use]
+    pub fn share(&self, length: f64) -> f64 {
+        if self.stiffness_per_length.is_some() { self.node_stiffness(length) / self.stiffness } else { 1.0 }
+    }
+}
+
+/// How equation (2) is solved for one configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Algorithm {
+    /// Minimum of the stored energy; geometry follows the deformation.
+    #[default]
+    Energy,
+    /// The paper's four-step iteration (section 2.1).
+    Paper,
+    /// Minimum of the stored energy with the geometry frozen, at rest or at the last of its updates.
+    Linearised,
+}
+
+impl Algorithm {
+    /// As the scene names it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Energy => "energy",
+            Self::Paper => "paper",
+            Self::Linearised => "linearised",
+        }
+    }
+}
+
+defaults! {
+    /// Default relative residual of the contact solver, in the energy norm (1). Forces are promised to balance K u to
+    /// 1e-6 of the largest, node by node, which a residual of 1e-6 misses by a third; the last steps converge fast, so
+    /// two digits more cost 8 % more iterations on the sphere (5.1 to 5.5).
+    tolerance: f64 = 1e-8;
+    /// Default cap on the contact solver's iterations (1).
+    max_iterations: u32 = 400;
+}
+
+fn at_least_one<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
+    match u32::deserialize(value)? {
+        0 => Err(D::Error::custom(format!("{KEY}is 0: it must be at least 1"))),
+        count => Ok(count),
+    }
+}
+
+fn updates<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
+    let updates = u32::deserialize(value)?;
+    if updates > MAX_UPDATES {
+        return Err(D::Error::custom(format!(
+            "{KEY}is {updates}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm \
+             = \"energy\""
+        )));
+    }
+    Ok(updates)
+}
+
+/// Reads a stiffness: a positive number, or `"rigid"` for infinity.
+fn number_or_rigid<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    Range::Positive.number_or("rigid", value)
+}
+
+impl ContactSpec {
+    /// Checks it against the arm, and gives the surface and the stiffness that it leaves out.
+    pub(super) fn check(&mut self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<(), SceneError> {
+        let nodes = || proxy.joints.iter().flat_map(|joint| &joint.nodes);
+        let error = |key: &str, message: &str| Err(checker.at(&format!("contact.{key}"), message));
+        match (self.stiffness > 0.0, self.stiffness_per_length) {
+            (true, None) => {}
+            (true, Some(_)) => {
+                let message = "contact has a stiffness of each node and one per length: leave out one of them";
+                return error("stiffness", message);
+            }
+            (false, Some(_)) if nodes().any(|node| node.length == 0.0) => {
+                let message = "stiffness_per_length is of nodes along links, and the proxy has nodes { at = .. } \
+                               besides: give stiffness [N/m] of each node instead";
+                return error("stiffness_per_length", message);
+            }
+            (false, Some(per_length)) => {
+                let length: f64 = nodes().map(|node| node.length).sum();
+                self.stiffness = per_length * (length / nodes().count() as f64) / 3.0;
+            }
+            (false, None) => {
+                let message = "contact has no stiffness: add stiffness [N/m] of each node, or \"rigid\", or \
+                               stiffness_per_length [N/m^2] of links";
+                return error("stiffness", message);
+            }
+        }
+        if self.algorithm != Algorithm::Linearised && checker.has("contact.updates") {
+            let message = "updates acts on linearised contact, whose geometry is frozen: add algorithm = \
+                           \"linearised\", or leave it out";
+            return error("updates", message);
+        }
+        match (self.surface, self.algorithm) {
+            (ContactSurface::Smooth, Algorithm::Paper) if checker.has("contact.surface") => {
+                let message =
+                    "the algorithm \"paper\" is defined on the triangles: leave surface out, or take \"energy\"";
+                error("surface", message)
+            }
+            (ContactSurface::Smooth, Algorithm::Paper) => {
+                self.surface = ContactSurface::Facets;
+                Ok(())
+            }
+            (ContactSurface::Facets, Algorithm::Energy | Algorithm::Linearised)
+                if nodes().any(|node| node.radius > 0.0) =>
+            {
+                let message = "nodes with a radius do not balance where the closest triangle changes: leave surface \
+                               out, and they touch the smooth surface";
+                error("surface", message)
+            }
+            _ => Ok(()),
+        }
+    }
+}
