@@ -3,10 +3,10 @@
 
 use super::{FieldError, Flags};
 use crate::{
-    JointMatrix,
     contact::Status,
     dataset::{Dataset, Grid},
     input::GREATEST_INPUT,
+    joint_matrix,
 };
 use std::collections::VecDeque;
 
@@ -69,7 +69,7 @@ impl Checked<'_> {
 
     /// Lower triangle of d tau/d q of `point` (N m/rad), where it is known and belongs to the energy.
     pub fn tangent(&self, point: usize) -> Option<&[f32]> {
-        let entries = JointMatrix::entries(self.dataset.grid.joints());
+        let entries = joint_matrix::entries(self.dataset.grid.joints());
         let tangent = self.dataset.tangent.as_ref()?.get(point * entries..(point + 1) * entries)?;
         (self.points[point].is_converged() && tangent.iter().any(|entry| *entry != 0.0)).then_some(tangent)
     }
@@ -92,7 +92,7 @@ pub(super) fn survey(dataset: &Dataset) -> Result<(Vec<Point>, Vec<usize>), Fiel
         expect("energy", count, energy.len())?;
     }
     if let Some(tangent) = &dataset.tangent {
-        expect("tangent", count.saturating_mul(JointMatrix::entries(grid.joints())), tangent.len())?;
+        expect("tangent", count.saturating_mul(joint_matrix::entries(grid.joints())), tangent.len())?;
     }
     if let Some(gap) = &dataset.gap {
         expect("gap", count, gap.len())?;

@@ -14,10 +14,10 @@ use super::{
     npmi::{Load, MidpointInertia, Motion, Npmi, Step},
 };
 use crate::{
-    JointVector, MAX_JOINTS,
+    JointMatrix, JointVector, MAX_JOINTS,
     contact::NodeForce,
     dataset::Dataset,
-    proxy::{Chain, JointMatrix},
+    proxy::Chain,
     scene::{Diagnostic, HapticEffects},
 };
 use contacts::Touch;

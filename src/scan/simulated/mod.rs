@@ -17,7 +17,8 @@ pub use sponge::{NodeContact, Sponge};
 use super::rig::{Rig, RigError, RigReading};
 use crate::{
     JointVector,
-    proxy::{Chain, Pose, solve_positive},
+    joint_matrix::solve_positive,
+    proxy::{Chain, Pose},
     scene::{Cover, JointKind, ProxySpec, SpecimenSpec},
 };
 use glam::DVec3;
