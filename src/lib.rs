@@ -104,7 +104,7 @@ pub mod cli;
 
 mod csv;
 mod input;
-mod joint_matrix;
+pub mod joint_matrix;
 mod joint_vector;
 pub mod memory;
 mod names;

@@ -5,6 +5,7 @@ use glam::DVec3;
 
 /// A linear congruential generator, of which the upper 53 bits count (Knuth 1998, The Art of Computer Programming,
 /// volume 2, section 3.3.4).
+#[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
@@ -18,6 +19,11 @@ impl Random {
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Zero mean, unit variance, nearly normal: a sum of twelve uniform numbers.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.between(-0.5, 0.5)).sum()
     }
 
     /// Uniform in the cube from -1 to 1.

@@ -104,7 +104,7 @@ impl Field {
         let joints = self.field.joints();
         let gap = self.dataset.get().dataset.gap.as_ref().ok_or_else(|| errors::absent(py, "gap"))?;
         Configurations::new(q, joints)?.fill(&[], None, |q, out: &mut [f64]| {
-            let write = |q: &[f64], out: &mut [f64]| out[0] = self.field.lattice().interpolate(gap, q);
+            let write = |q: &[f64], out: &mut [f64]| out[0] = self.field.grid().interpolate(gap, q);
             fill_rows(q, joints, out, write).map_err(errors::batch)
         })
     }

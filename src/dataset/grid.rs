@@ -27,7 +27,7 @@ pub struct JointLabel {
     pub unit: String,
 }
 
-/// A uniform grid, last axis fastest.
+/// A uniform grid, last axis fastest: the numbering of its points, their neighbours, and the cells between them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// One per joint, in the chain's order.
@@ -39,6 +39,12 @@ impl Axis {
     #[must_use]
     pub fn coordinate(&self, k: usize) -> f64 {
         self.start + k as f64 * self.step
+    }
+
+    /// Coordinate of the last grid line (rad or m).
+    #[must_use]
+    pub fn last(&self) -> f64 {
+        self.coordinate(self.count.saturating_sub(1))
     }
 
     /// Number of the grid line nearest to `coordinate`, at the axis's ends beyond them.
@@ -115,7 +121,7 @@ impl Grid {
             }
             points = points.checked_mul(axis.count).ok_or("the grid has too many points")?;
             // Where a step is lost in rounding at either end, neighbouring grid lines coincide.
-            let (first, last) = (axis.coordinate(0), axis.coordinate(axis.count - 1));
+            let (first, last) = (axis.start, axis.last());
             let ascends = axis.step > 0.0 && first + axis.step > first && last - axis.step < last;
             if !(axis.step.is_finite() && first.is_finite() && last.is_finite() && ascends) {
                 return Err(format!(
@@ -152,14 +158,17 @@ impl Grid {
         self.axes.iter().zip(lines).fold(0, |point, (axis, line)| point * axis.count + line)
     }
 
-    /// Returns the points before and after `point` along each joint, the last joint first.
-    pub fn neighbours(&self, point: usize) -> impl Iterator<Item = [Option<usize>; 2]> {
-        let mut stride = 1;
-        self.axes.iter().rev().map(move |axis| {
-            let (own, line) = (stride, point / stride % axis.count);
-            stride *= axis.count;
-            [(line > 0).then(|| point - own), (line + 1 < axis.count).then(|| point + own)]
-        })
+    /// Returns the points before and after `point` along `axis`.
+    #[must_use]
+    pub fn beside(&self, point: usize, axis: usize) -> [Option<usize>; 2] {
+        let stride: usize = self.axes[axis + 1..].iter().map(|axis| axis.count).product();
+        let (line, count) = (point / stride % self.axes[axis].count, self.axes[axis].count);
+        [(line > 0).then(|| point - stride), (line + 1 < count).then(|| point + stride)]
+    }
+
+    /// Returns the points before and after `point` along each axis.
+    pub fn neighbours(&self, point: usize) -> impl DoubleEndedIterator<Item = [Option<usize>; 2]> {
+        (0..self.joints()).map(move |axis| self.beside(point, axis))
     }
 
     /// The configuration of the grid's range that is nearest to `q`, joint by joint.
@@ -167,7 +176,7 @@ impl Grid {
     pub fn clamp(&self, q: &JointVector) -> JointVector {
         let mut inside = *q;
         for (x, axis) in inside.iter_mut().zip(&self.axes) {
-            *x = x.max(axis.start).min(axis.coordinate(axis.count.saturating_sub(1)));
+            *x = x.max(axis.start).min(axis.last());
         }
         inside
     }
@@ -219,7 +228,7 @@ mod tests {
             let before = |apart: usize, line: usize| (line > 0).then(|| point - apart);
             let after = |apart: usize, line: usize, count: usize| (line + 1 < count).then(|| point + apart);
             let along = |axis: usize, apart, count| [before(apart, lines[axis]), after(apart, lines[axis], count)];
-            assert!(grid.neighbours(point).eq([along(2, 1, 4), [None; 2], along(0, 4, 3)]));
+            assert!(grid.neighbours(point).eq([along(0, 4, 3), [None; 2], along(2, 1, 4)]));
         }
     }
 

@@ -17,6 +17,7 @@ mod file;
 mod grid;
 mod known;
 mod read;
+mod stencil;
 pub mod store;
 mod stored;
 mod summary;
@@ -34,6 +35,7 @@ pub(crate) use file::{
     write_container, write_file,
 };
 pub use grid::{Axis, Grid, JointLabel};
+pub use stencil::Stencil;
 pub(crate) use stored::{Axes, CONTACTS, RESULTS, Stored, TOUCHES};
 pub use summary::{Refinement, StatusCounts, Summary};
 

@@ -2,7 +2,7 @@
 //! checks and the exports go through this table, and [docs/dataset.md](../../docs/dataset.md) is held against it.
 
 use super::{Axis, Contacts, Dataset, Grid, Solid, Surface};
-use crate::JointMatrix;
+use crate::joint_matrix;
 use safetensors::Dtype;
 
 /// An array of a dataset, in the order of a file among those of numbers of the same size.
@@ -147,7 +147,7 @@ impl Stored {
         match self.description().axes {
             Axes::Grid => over_grid(None),
             Axes::Joints(_) => over_grid(Some(grid.joints())),
-            Axes::Triangle(_) => over_grid(Some(JointMatrix::entries(grid.joints()))),
+            Axes::Triangle(_) => over_grid(Some(joint_matrix::entries(grid.joints()))),
             Axes::Own(axes) => axes.iter().enumerate().map(|(k, (_, length))| (k > 0).then_some(*length)).collect(),
         }
     }

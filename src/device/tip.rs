@@ -12,7 +12,8 @@
 use super::{Applied, Device, Guard, LinearMap, Reading, Scheduler};
 use crate::{
     JointVector, MAX_JOINTS,
-    proxy::{Chain, Pose, inverse_kinematics::approach, solve_positive},
+    joint_matrix::solve_positive,
+    proxy::{Chain, Pose, inverse_kinematics::approach},
     scene::{DeviceSpec, HapticsSpec},
 };
 use glam::DVec3;

@@ -5,7 +5,7 @@
 //! The tensor product has `(n + 1)^d` coefficients for degree n along each of d axes: digit a of a coefficient's place,
 //! to base n + 1, is its number along axis a.
 
-use crate::{JointVector, MAX_JOINTS, proxy::JointMatrix};
+use crate::{JointMatrix, JointVector, MAX_JOINTS};
 
 /// A polynomial over one cell.
 #[derive(Clone)]

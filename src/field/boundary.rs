@@ -30,8 +30,10 @@
 //! `Ks <= mu bv / T` bounds every slope that the loop renders, that of a jump and that of a stiff object alike. To feel
 //! it stiffer, raise Ks to the bound, and the bound by bv.
 
-use super::stencil::Lattice;
-use crate::{JointVector, MAX_JOINTS};
+use crate::{
+    JointVector, MAX_JOINTS,
+    dataset::{Axis, Grid},
+};
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 /// The layer of one grid.
@@ -50,10 +52,10 @@ const NOTHING_FREE: f64 = 1e100;
 impl BoundaryLayer {
     /// A layer of slope `slope` Ks, one positive number per joint (N m/rad).
     #[must_use]
-    pub fn new(lattice: &Lattice, slope: &JointVector) -> Self {
+    pub fn new(grid: &Grid, slope: &JointVector) -> Self {
         let mut compliance = *slope;
         compliance.iter_mut().for_each(|slope| *slope = 1.0 / *slope);
-        let density = lattice.lines().zip(compliance.iter()).map(|((_, step, _), c)| c / (step * step)).sum::<f64>();
+        let density = grid.axes.iter().zip(compliance.iter()).map(|(axis, c)| c / (axis.step * axis.step)).sum::<f64>();
         Self { compliance, density: density.sqrt() }
     }
 
@@ -74,13 +76,13 @@ impl BoundaryLayer {
     /// largest size of a torque in the dataset (sqrt(J)); depths beyond it are not distinguished, since nothing is held
     /// back there.
     #[must_use]
-    pub fn depths_behind_index(&self, lattice: &Lattice, free: &[bool], threshold: f64, greatest: f64) -> Vec<f64> {
-        let near = beside(lattice, free);
+    pub fn depths_behind_index(&self, grid: &Grid, free: &[bool], threshold: f64, greatest: f64) -> Vec<f64> {
+        let near = beside(grid, free);
         if !near.contains(&true) {
             return vec![NOTHING_FREE; free.len()];
         }
-        let beyond = self.distances(lattice, &near, greatest * (lattice.joints() as f64).sqrt());
-        let steepest = self.steepest(lattice, &beyond);
+        let beyond = self.distances(grid, &near, greatest * (grid.joints() as f64).sqrt());
+        let steepest = self.steepest(grid, &beyond);
         let level = |(&free, &beyond): (&bool, &f64)| if free { 0.0 } else { 1.0 + self.density * beyond / steepest };
         free.iter().zip(&beyond).map(level).map(|level| (level - threshold) / self.density).collect()
     }
@@ -88,7 +90,7 @@ impl BoundaryLayer {
     /// Distance (sqrt(J)) of each grid point from those that `origins` marks, or `farthest` where that is less.
     ///
     /// Points are settled in the order of their distance, each from its settled neighbours.
-    fn distances(&self, lattice: &Lattice, origins: &[bool], farthest: f64) -> Vec<f64> {
+    fn distances(&self, grid: &Grid, origins: &[bool], farthest: f64) -> Vec<f64> {
         let mut distance: Vec<f64> = origins.iter().map(|&origin| if origin { 0.0 } else { farthest }).collect();
         // Distances are not negative: their bits are in the same order as they.
         let mut queue: BinaryHeap<Reverse<(u64, usize)>> =
@@ -98,15 +100,11 @@ impl BoundaryLayer {
             if std::mem::replace(&mut settled[point], true) {
                 continue;
             }
-            for (count, _, stride) in lattice.lines() {
-                for neighbour in
-                    Lattice::neighbours(point, count, stride).into_iter().flatten().filter(|&p| !settled[p])
-                {
-                    let found = self.behind(lattice, neighbour, &distance, &settled);
-                    if found < distance[neighbour] {
-                        distance[neighbour] = found;
-                        queue.push(Reverse((found.to_bits(), neighbour)));
-                    }
+            for neighbour in grid.neighbours(point).flatten().flatten().filter(|&p| !settled[p]) {
+                let found = self.behind(grid, neighbour, &distance, &settled);
+                if found < distance[neighbour] {
+                    distance[neighbour] = found;
+                    queue.push(Reverse((found.to_bits(), neighbour)));
                 }
             }
         }
@@ -115,12 +113,12 @@ impl BoundaryLayer {
 
     /// The eikonal equation at `point`: the u with `sum_a (u - u_a)^2 / (Ks_a h_a^2) = 1` over the axes whose nearer
     /// settled neighbour u_a lies below u.
-    fn behind(&self, lattice: &Lattice, point: usize, distance: &[f64], settled: &[bool]) -> f64 {
+    fn behind(&self, grid: &Grid, point: usize, distance: &[f64], settled: &[bool]) -> f64 {
         let mut below = [(f64::INFINITY, 0.0); MAX_JOINTS];
-        for (((count, step, stride), compliance), below) in lattice.lines().zip(self.compliance.iter()).zip(&mut below)
-        {
-            let nearer = Lattice::neighbours(point, count, stride).into_iter().flatten().filter(|&p| settled[p]);
-            *below = (nearer.map(|p| distance[p]).fold(f64::INFINITY, f64::min), compliance / (step * step));
+        let axes = grid.axes.iter().zip(grid.neighbours(point)).zip(self.compliance.iter());
+        for (((axis, beside), compliance), below) in axes.zip(&mut below) {
+            let nearer = beside.into_iter().flatten().filter(|&p| settled[p]);
+            *below = (nearer.map(|p| distance[p]).fold(f64::INFINITY, f64::min), compliance / (axis.step * axis.step));
         }
         below.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         // w u^2 - 2 p u + q = 1 with the sums over the axes taken so far.
@@ -137,26 +135,25 @@ impl BoundaryLayer {
 
     /// Greatest gradient of the interpolated `depth`, at least one: at a corner of a cell its components are the
     /// differences along the edges that meet there, and nowhere in the cell is it greater.
-    fn steepest(&self, lattice: &Lattice, depth: &[f64]) -> f64 {
+    fn steepest(&self, grid: &Grid, depth: &[f64]) -> f64 {
         let square = |point: usize| {
-            let along = |((count, step, stride), compliance): ((usize, f64, usize), &f64)| {
-                let rise = Lattice::neighbours(point, count, stride)
-                    .map(|p| p.map_or(0.0, |p| (depth[point] - depth[p]).powi(2)));
-                rise[0].max(rise[1]) * compliance / (step * step)
+            let along = |((axis, beside), compliance): ((&Axis, [Option<usize>; 2]), &f64)| {
+                let rise = beside.map(|p| p.map_or(0.0, |p| (depth[point] - depth[p]).powi(2)));
+                rise[0].max(rise[1]) * compliance / (axis.step * axis.step)
             };
-            lattice.lines().zip(self.compliance.iter()).map(along).sum::<f64>()
+            grid.axes.iter().zip(grid.neighbours(point)).zip(self.compliance.iter()).map(along).sum::<f64>()
         };
         (0..depth.len()).map(square).fold(1.0, f64::max).sqrt()
     }
 }
 
 /// The points of `set` and all within a king's move of one.
-fn beside(lattice: &Lattice, set: &[bool]) -> Vec<bool> {
+fn beside(grid: &Grid, set: &[bool]) -> Vec<bool> {
     let mut grown = set.to_vec();
-    for (count, _, stride) in lattice.lines() {
+    for axis in 0..grid.joints() {
         let before = grown.clone();
         for (point, grown) in grown.iter_mut().enumerate() {
-            *grown |= Lattice::neighbours(point, count, stride).into_iter().flatten().any(|p| before[p]);
+            *grown |= grid.beside(point, axis).into_iter().flatten().any(|p| before[p]);
         }
     }
     grown
@@ -172,11 +169,11 @@ mod tests {
     }
 
     /// Free points, one in `sparsity`, the same every time.
-    fn scattered(lattice: &Lattice, sparsity: u64) -> Vec<bool> {
+    fn scattered(grid: &Grid, sparsity: u64) -> Vec<bool> {
         let mut random = Random::new(12345);
         let mut next = || random.between(0.0, sparsity as f64) < 1.0;
-        let mut free: Vec<bool> = (0..lattice.points()).map(|_| next()).collect();
-        free[lattice.points() / 2] = true;
+        let mut free: Vec<bool> = (0..grid.points()).map(|_| next()).collect();
+        free[grid.points() / 2] = true;
         free
     }
 
@@ -188,17 +185,14 @@ mod tests {
             (vec![(0.0, 1.0, 6), (0.0, 0.5, 7), (0.0, 2.0, 5)], vec![1.0, 3.0, 0.5]),
         ];
         for (axes, slopes) in cases {
-            let lattice = Lattice::new(&grid(&axes)).unwrap();
-            let layer = BoundaryLayer::new(&lattice, &slope(&slopes));
+            let grid = grid(&axes);
+            let layer = BoundaryLayer::new(&grid, &slope(&slopes));
             for sparsity in [3, 20, 100] {
-                let free = scattered(&lattice, sparsity);
-                let depths = layer.depths_behind_index(&lattice, &free, 0.5, 1e9);
+                let free = scattered(&grid, sparsity);
+                let depths = layer.depths_behind_index(&grid, &free, 0.5, 1e9);
                 let levels: Vec<f64> = depths.iter().map(|depth| depth * layer.density + 0.5).collect();
                 let steps = |p: usize, q: usize| {
-                    let along = |(count, _, stride)| {
-                        Lattice::position(p, count, stride).abs_diff(Lattice::position(q, count, stride))
-                    };
-                    lattice.lines().map(along).max().unwrap()
+                    grid.lines(p).iter().zip(grid.lines(q)).map(|(p, q)| p.abs_diff(q)).max().unwrap()
                 };
                 for (p, &level) in levels.iter().enumerate() {
                     match (0..free.len()).filter(|&q| free[q]).map(|q| steps(p, q)).min() {
@@ -208,20 +202,19 @@ mod tests {
                     }
                 }
                 let beyond: Vec<f64> = levels.iter().map(|level| (level - 1.0).max(0.0) / layer.density).collect();
-                assert!(layer.steepest(&lattice, &beyond) <= 1.0 + 1e-12);
+                assert!(layer.steepest(&grid, &beyond) <= 1.0 + 1e-12);
             }
         }
     }
 
     #[test]
     fn behind_a_flat_boundary_of_any_direction_depth_grows_by_the_distance_travelled() {
-        let lattice = Lattice::new(&grid(&[(0.0, 0.1, 16); 3])).unwrap();
-        let layer = BoundaryLayer::new(&lattice, &slope(&[1.0; 3]));
-        let position = |p: usize| lattice.lines().map(move |(count, _, stride)| Lattice::position(p, count, stride));
+        let grid = grid(&[(0.0, 0.1, 16); 3]);
+        let layer = BoundaryLayer::new(&grid, &slope(&[1.0; 3]));
         for directions in [1, 2, 3] {
-            let along = |p: usize| position(p).take(directions).sum::<usize>();
-            let free: Vec<bool> = (0..lattice.points()).map(|p| along(p) < 2 * directions).collect();
-            let depths = layer.depths_behind_index(&lattice, &free, 0.5, 1e9);
+            let along = |p: usize| grid.lines(p).into_iter().take(directions).sum::<usize>();
+            let free: Vec<bool> = (0..grid.points()).map(|p| along(p) < 2 * directions).collect();
+            let depths = layer.depths_behind_index(&grid, &free, 0.5, 1e9);
             // The boundary is notched where it meets the grid's rim, which is what G is above one for.
             let at = |k: usize| depths[k * (256 + 16 + 1)];
             let (grown, travelled) = (at(12) - at(5), 0.7 * (directions as f64).sqrt());
@@ -231,19 +224,19 @@ mod tests {
 
     #[test]
     fn without_a_free_point_the_layer_never_holds_back() {
-        let lattice = Lattice::new(&grid(&[(0.0, 0.1, 4)])).unwrap();
-        let layer = BoundaryLayer::new(&lattice, &slope(&[3.0]));
-        let depths = layer.depths_behind_index(&lattice, &[false; 4], 0.5, 1.0);
+        let grid = grid(&[(0.0, 0.1, 4)]);
+        let layer = BoundaryLayer::new(&grid, &slope(&[3.0]));
+        let depths = layer.depths_behind_index(&grid, &[false; 4], 0.5, 1.0);
         assert_eq!(depths, [NOTHING_FREE; 4]);
         assert_eq!(layer.share(&[1e9], depths[0]), 1.0);
     }
 
     #[test]
     fn the_layer_starts_at_zero_and_rises_with_the_slope() {
-        let lattice = Lattice::new(&grid(&[(0.0, 0.1, 4)])).unwrap();
-        let layer = BoundaryLayer::new(&lattice, &slope(&[3.0]));
+        let grid = grid(&[(0.0, 0.1, 4)]);
+        let layer = BoundaryLayer::new(&grid, &slope(&[3.0]));
         // One cell of 0.1 rad behind the free point the boundary is half a cell off: 0.15 N m at 3 N m/rad.
-        let depths = layer.depths_behind_index(&lattice, &[true, false, false, false], 0.5, 1e9);
+        let depths = layer.depths_behind_index(&grid, &[true, false, false, false], 0.5, 1e9);
         for (k, bound) in [(0, 0.0), (1, 0.15), (2, 0.45), (3, 0.75)] {
             assert!((9.0 * layer.share(&[9.0], depths[k]) - bound).abs() < 1e-12, "at {k}");
         }
@@ -254,8 +247,8 @@ mod tests {
     #[test]
     fn a_change_of_units_changes_nothing() {
         // The second joint in radians, then in milliradians: torque per mrad, slope per mrad^2.
-        let radians = Lattice::new(&grid(&[(0.0, 0.1, 4), (0.0, 0.2, 4)])).unwrap();
-        let milliradians = Lattice::new(&grid(&[(0.0, 0.1, 4), (0.0, 200.0, 4)])).unwrap();
+        let radians = grid(&[(0.0, 0.1, 4), (0.0, 0.2, 4)]);
+        let milliradians = grid(&[(0.0, 0.1, 4), (0.0, 200.0, 4)]);
         let (a, b) = (
             BoundaryLayer::new(&radians, &slope(&[3.0, 2.0])),
             BoundaryLayer::new(&milliradians, &slope(&[3.0, 2e-6])),

@@ -1,6 +1,5 @@
 //! Why a dataset cannot be rendered, and what to do.
 
-use super::stencil::LatticeError;
 use crate::{JointVector, memory::Shortage};
 
 /// A dataset cannot be rendered.
@@ -8,8 +7,8 @@ use crate::{JointVector, memory::Shortage};
 #[non_exhaustive]
 pub enum FieldError {
     /// Its grid is none.
-    #[error(transparent)]
-    Grid(#[from] LatticeError),
+    #[error("{0}")]
+    Grid(String),
     /// A column's length does not fit the grid.
     #[error("the dataset's {column} has {found} entries where its grid asks for {expected}: bake it again")]
     Length {

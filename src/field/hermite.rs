@@ -10,11 +10,11 @@
 //! value, one gradient entry an axis joins the contraction where its axis is the one contracted: about 4^d sums of four
 //! products in all. Nothing allocates, nothing branches.
 
-use super::{
-    bernstein::{Bernstein, Bounds, place},
-    stencil::{Lattice, Stencil},
+use super::bernstein::{Bernstein, Bounds, place};
+use crate::{
+    JointVector,
+    dataset::{Grid, Stencil},
 };
-use crate::JointVector;
 
 /// An interpolated function.
 pub(super) struct Hermite {
@@ -26,26 +26,26 @@ pub(super) struct Hermite {
 }
 
 impl Hermite {
-    /// Returns the memory of the polynomials on `lattice` (bytes).
-    pub fn bytes(lattice: &Lattice) -> usize {
-        lattice.points().saturating_mul(size_of::<f64>() << lattice.joints())
+    /// Returns the memory of the polynomials on `grid` (bytes).
+    pub fn bytes(grid: &Grid) -> usize {
+        grid.points().saturating_mul(size_of::<f64>() << grid.joints())
     }
 
-    /// The function with `values` and gradients `slopes` at the points of `lattice`, and the second derivative along
+    /// The function with `values` and gradients `slopes` at the points of `grid`, and the second derivative along
     /// axes a and b that `mixed` gives for (point, a, b), where it gives one.
     ///
     /// All other mixed derivatives are differences of those of one order less: central ones, one-sided at the rim, and
     /// the mean over the axis that comes last.
     pub fn new(
-        lattice: &Lattice,
+        grid: &Grid,
         values: &[f64],
         slopes: &[JointVector],
         mixed: impl Fn(usize, usize, usize) -> Option<f64>,
     ) -> Self {
-        let joints = lattice.joints();
+        let joints = grid.joints();
         let sets = 1_usize << joints;
         let mut per_step = JointVector::zeros(joints);
-        per_step.iter_mut().zip(lattice.lines()).for_each(|(inverse, (_, step, _))| *inverse = 1.0 / step);
+        per_step.iter_mut().zip(&grid.axes).for_each(|(inverse, axis)| *inverse = 1.0 / axis.step);
         let mut derivatives = vec![0.0; values.len() * sets];
         for ((record, &value), slopes) in derivatives.chunks_exact_mut(sets).zip(values).zip(slopes) {
             record[0] = value;
@@ -64,8 +64,8 @@ impl Hermite {
                     continue;
                 }
                 let mut sum = 0.0;
-                for (a, (count, _, stride)) in lattice.lines().enumerate().filter(|(a, _)| set >> a & 1 == 1) {
-                    let [before, after] = Lattice::neighbours(point, count, stride);
+                for a in (0..joints).filter(|a| set >> a & 1 == 1) {
+                    let [before, after] = grid.beside(point, a);
                     let apart = f64::from(u8::from(before.is_some()) + u8::from(after.is_some()));
                     let at = |p: Option<usize>| derivatives[p.unwrap_or(point) * sets + (set ^ 1 << a)];
                     sum += if apart > 0.0 { (at(after) - at(before)) / apart } else { 0.0 };
@@ -83,19 +83,21 @@ impl Hermite {
 
     /// Bounds on the function and its derivatives over the cell whose first corner is `point`, `None` where no cell
     /// begins there.
-    pub fn bounds(&self, lattice: &Lattice, point: usize) -> Option<Bounds> {
+    pub fn bounds(&self, grid: &Grid, point: usize) -> Option<Bounds> {
         let joints = self.joints;
         // An axis of one point has no extent: the cell is flat there.
         let mut corners = vec![point];
         let mut per_step = self.per_step;
-        for ((count, _, stride), per_step) in lattice.lines().zip(per_step.iter_mut()) {
-            if count > 1 && Lattice::position(point, count, stride) + 1 == count {
+        for (a, (axis, per_step)) in grid.axes.iter().zip(per_step.iter_mut()).enumerate() {
+            let after = grid.beside(point, a)[1];
+            if axis.count > 1 && after.is_none() {
                 return None;
             }
-            if count == 1 {
+            if axis.count == 1 {
                 *per_step = 0.0;
             }
-            let far: Vec<usize> = corners.iter().map(|corner| corner + if count > 1 { stride } else { 0 }).collect();
+            let beyond = after.unwrap_or(point) - point;
+            let far: Vec<usize> = corners.iter().map(|corner| corner + beyond).collect();
             corners.extend(far);
         }
         let mut numbers = vec![0.0; 1 << (2 * joints)];

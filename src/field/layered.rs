@@ -8,13 +8,11 @@
 //! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the
 //! object where the measurements do: it keeps the value that it has there.
 
-use super::{
-    FieldError,
-    boundary::BoundaryLayer,
-    points::Checked,
-    stencil::{Lattice, Stencil},
+use super::{FieldError, boundary::BoundaryLayer, points::Checked};
+use crate::{
+    JointVector,
+    dataset::{Axis, Grid, Stencil},
 };
-use crate::JointVector;
 
 /// Interleaved point by point, so that a corner is one stretch of memory.
 pub(super) struct Layered {
@@ -37,23 +35,23 @@ pub(super) struct Interpolated {
 impl Layered {
     /// The paper's: contact where the index exceeds `threshold`.
     pub fn linear(data: &Checked<'_>, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
-        let layer = BoundaryLayer::new(data.lattice, slope);
-        let zeros = JointVector::zeros(data.lattice.joints());
-        let mut records = Vec::with_capacity(data.points.len() * (data.lattice.joints() + 2));
+        let layer = BoundaryLayer::new(&data.dataset.grid, slope);
+        let zeros = JointVector::zeros(data.dataset.grid.joints());
+        let mut records = Vec::with_capacity(data.points.len() * (data.dataset.grid.joints() + 2));
         for point in 0..data.points.len() {
             records.extend_from_slice(data.torque(point, &zeros)?);
             records.extend([0.0, data.energy(point)?]);
         }
         let mut field = Self { layer, records };
         let free: Vec<bool> = data.points.iter().map(|point| !point.touching).collect();
-        let depths = field.layer.depths_behind_index(data.lattice, &free, threshold, field.greatest(data));
+        let depths = field.layer.depths_behind_index(&data.dataset.grid, &free, threshold, field.greatest(data));
         field.put_depths(&depths);
         Ok(field)
     }
 
     /// Largest size of a torque (sqrt(J)).
     fn greatest(&self, data: &Checked<'_>) -> f64 {
-        let joints = data.lattice.joints();
+        let joints = data.dataset.grid.joints();
         let sizes = self.records.chunks_exact(joints + 2).map(|record| self.layer.size(&record[..joints]));
         sizes.fold(0.0, f64::max)
     }
@@ -86,20 +84,20 @@ impl Layered {
     /// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is
     /// affine in each coordinate of a cell, so that its norm is greatest at a corner, where its columns are the
     /// differences along the edges that meet there.
-    pub fn relative_stiffness(&self, lattice: &Lattice, slopes: &JointVector) -> f64 {
-        let joints = lattice.joints();
+    pub fn relative_stiffness(&self, grid: &Grid, slopes: &JointVector) -> f64 {
+        let joints = grid.joints();
         let torque = |point: usize| &self.records[point * (joints + 2)..point * (joints + 2) + joints];
         let steepness = |p: usize, q: usize| {
             let scaled = |((a, b), slope): ((&f64, &f64), &f64)| (a - b).powi(2) / slope;
             torque(p).iter().zip(torque(q)).zip(slopes.iter()).map(scaled).sum::<f64>()
         };
         let norm = |point: usize| {
-            let along = |((count, step, stride), slope): ((usize, f64, usize), &f64)| {
-                let neighbours = Lattice::neighbours(point, count, stride).into_iter().flatten();
-                neighbours.map(|p| steepness(point, p)).fold(0.0, f64::max) / (step * step * slope)
+            let along = |((axis, beside), slope): ((&Axis, [Option<usize>; 2]), &f64)| {
+                let rises = beside.into_iter().flatten().map(|p| steepness(point, p));
+                rises.fold(0.0, f64::max) / (axis.step * axis.step * slope)
             };
-            lattice.lines().zip(slopes.iter()).map(along).sum::<f64>()
+            grid.axes.iter().zip(grid.neighbours(point)).zip(slopes.iter()).map(along).sum::<f64>()
         };
-        (0..lattice.points()).map(norm).fold(0.0, f64::max).sqrt()
+        (0..grid.points()).map(norm).fold(0.0, f64::max).sqrt()
     }
 }

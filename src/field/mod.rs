@@ -4,7 +4,7 @@
 //! behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient; `direct`,
 //! which solves contact while it is felt, has `potential` wherever its solution is late. A refined dataset is
 //! interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without memory. What they
-//! share is here: the cell around q, the fade outside the grid (`stencil.rs`), what is said of points that were not
+//! share is here: the cell around q, the fade outside the grid (`dataset/stencil.rs`), what is said of points that were not
 //! computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored
 //! (contact, unconverged, overflowed) and 0 at free points.
 //!
@@ -23,7 +23,6 @@ mod potential;
 pub mod range;
 mod refined;
 mod slope;
-pub mod stencil;
 mod stiffness;
 mod work;
 
@@ -36,7 +35,7 @@ pub(crate) use slope::GRADIENT_STEP;
 use crate::{
     JointVector, MAX_JOINTS,
     contact::Status,
-    dataset::Dataset,
+    dataset::{Dataset, Grid, Stencil},
     scene::Interpolation,
     store::{Order, Store},
 };
@@ -44,12 +43,11 @@ use layered::Layered;
 use points::{Checked, Point};
 use potential::Potential;
 use std::sync::Arc;
-use stencil::{Lattice, Stencil};
 use stiffness::Steepest;
 
 /// The contact torque around one object.
 pub struct TorqueField {
-    lattice: Lattice,
+    grid: Grid,
     source: Source,
     steepest: Steepest,
 }
@@ -143,34 +141,35 @@ impl TorqueField {
         if !(0.0..1.0).contains(&threshold) {
             return Err(FieldError::Threshold(threshold));
         }
-        let lattice = Lattice::new(&dataset.grid)?;
-        if slope.len() != lattice.joints() || !slope.iter().all(|slope| *slope > 0.0 && slope.is_finite()) {
+        dataset.grid.check().map_err(FieldError::Grid)?;
+        let grid = dataset.grid.clone();
+        if slope.len() != grid.joints() || !slope.iter().all(|slope| *slope > 0.0 && slope.is_finite()) {
             return Err(FieldError::Slope(*slope));
         }
         if let Some(store) = &dataset.refinement {
             let source = Source::Store(Arc::clone(store));
-            return Ok(Self { lattice, source, steepest: Steepest::default() });
+            return Ok(Self { grid, source, steepest: Steepest::default() });
         }
-        let (points, nearest) = points::survey(&lattice, dataset)?;
-        let data = Checked { lattice: &lattice, dataset, points: &points, nearest: &nearest };
+        let (points, nearest) = points::survey(dataset)?;
+        let data = Checked { dataset, points: &points, nearest: &nearest };
         let interpolant = match interpolation {
             Interpolation::Linear => Interpolant::Layered(Layered::linear(&data, threshold, slope)?),
             Interpolation::Potential | Interpolation::Direct => Interpolant::Potential(Potential::new(&data)?),
         };
         let on_grid = OnGrid { points, has_energy: dataset.energy.is_some(), interpolant };
-        Ok(Self { lattice, source: Source::Grid(on_grid), steepest: Steepest::default() })
+        Ok(Self { grid, source: Source::Grid(on_grid), steepest: Steepest::default() })
     }
 
     /// Number of joints d.
     #[must_use]
     pub fn joints(&self) -> usize {
-        self.lattice.joints()
+        self.grid.joints()
     }
 
     /// The grid.
     #[must_use]
-    pub fn lattice(&self) -> &Lattice {
-        &self.lattice
+    pub fn grid(&self) -> &Grid {
+        &self.grid
     }
 
     /// Whether the dataset has the energy U.
@@ -201,10 +200,10 @@ impl TorqueField {
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         match &self.source {
             Source::Grid(OnGrid { interpolant: Interpolant::Layered(layered), .. }) => {
-                layered.relative_stiffness(&self.lattice, slopes)
+                layered.relative_stiffness(&self.grid, slopes)
             }
             Source::Grid(OnGrid { interpolant: Interpolant::Potential(potential), .. }) => {
-                self.steepest.norm(slopes, 0, || potential.steepest(&self.lattice, slopes))
+                self.steepest.norm(slopes, 0, || potential.steepest(&self.grid, slopes))
             }
             Source::Store(store) => self.steepest.norm(slopes, store.horizon(), || refined::steepest(store, slopes)),
         }
@@ -215,9 +214,9 @@ impl TorqueField {
     pub fn sample(&self, q: &[f64]) -> Sample {
         let on_grid = match &self.source {
             Source::Grid(on_grid) => on_grid,
-            Source::Store(store) => return refined::sample(&self.lattice, store, q, u64::MAX).0,
+            Source::Store(store) => return refined::sample(&self.grid, store, q, u64::MAX).0,
         };
-        let stencil = self.lattice.locate(q);
+        let stencil = self.grid.locate(q);
         match self.joints() {
             1 => on_grid.sample_joints::<1, 1>(&stencil),
             2 => on_grid.sample_joints::<2, 4>(&stencil),
@@ -242,7 +241,7 @@ impl TorqueField {
     #[must_use]
     pub fn sample_within(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
         match &self.source {
-            Source::Store(store) => refined::sample(&self.lattice, store, q, horizon),
+            Source::Store(store) => refined::sample(&self.grid, store, q, horizon),
             Source::Grid(_) => (self.sample(q), 0),
         }
     }

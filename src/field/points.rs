@@ -1,8 +1,13 @@
 //! The facts that a field has at each grid point beside numbers that are interpolated, and those where nothing was
 //! computed.
 
-use super::{FieldError, Flags, stencil::Lattice};
-use crate::{JointMatrix, contact::Status, dataset::Dataset, input::GREATEST_INPUT};
+use super::{FieldError, Flags};
+use crate::{
+    contact::Status,
+    dataset::{Dataset, Grid},
+    input::GREATEST_INPUT,
+    joint_matrix,
+};
 use std::collections::VecDeque;
 
 /// Values of a grid point that are not interpolated.
@@ -47,7 +52,6 @@ impl Point {
 
 /// A dataset whose columns have been checked, point by point.
 pub(super) struct Checked<'a> {
-    pub lattice: &'a Lattice,
     pub dataset: &'a Dataset,
     pub points: &'a [Point],
     /// For each point the nearest one that was computed; itself if it was.
@@ -65,7 +69,7 @@ impl Checked<'_> {
 
     /// Lower triangle of d tau/d q of `point` (N m/rad), where it is known and belongs to the energy.
     pub fn tangent(&self, point: usize) -> Option<&[f32]> {
-        let entries = JointMatrix::entries(self.lattice.joints());
+        let entries = joint_matrix::entries(self.dataset.grid.joints());
         let tangent = self.dataset.tangent.as_ref()?.get(point * entries..(point + 1) * entries)?;
         (self.points[point].is_converged() && tangent.iter().any(|entry| *entry != 0.0)).then_some(tangent)
     }
@@ -79,16 +83,16 @@ impl Checked<'_> {
     }
 }
 
-/// Points of `dataset` on `lattice`, and for each the nearest one that was computed.
-pub(super) fn survey(lattice: &Lattice, dataset: &Dataset) -> Result<(Vec<Point>, Vec<usize>), FieldError> {
-    let count = lattice.points();
-    expect("torque", count.saturating_mul(lattice.joints()), dataset.torque.len())?;
+/// Points of `dataset`, and for each the nearest one that was computed.
+pub(super) fn survey(dataset: &Dataset) -> Result<(Vec<Point>, Vec<usize>), FieldError> {
+    let (grid, count) = (&dataset.grid, dataset.grid.points());
+    expect("torque", count.saturating_mul(grid.joints()), dataset.torque.len())?;
     expect("status", count, dataset.status.len())?;
     if let Some(energy) = &dataset.energy {
         expect("energy", count, energy.len())?;
     }
     if let Some(tangent) = &dataset.tangent {
-        expect("tangent", count.saturating_mul(JointMatrix::entries(lattice.joints())), tangent.len())?;
+        expect("tangent", count.saturating_mul(joint_matrix::entries(grid.joints())), tangent.len())?;
     }
     if let Some(gap) = &dataset.gap {
         expect("gap", count, gap.len())?;
@@ -97,7 +101,7 @@ pub(super) fn survey(lattice: &Lattice, dataset: &Dataset) -> Result<(Vec<Point>
         expect("contact offsets", count + 1, contacts.offsets.len())?;
     }
     let mut points: Vec<Point> = (0..count).map(|point| Point::of(dataset, point)).collect();
-    let nearest = nearest_present(lattice, &points).ok_or(FieldError::Empty)?;
+    let nearest = nearest_present(grid, &points).ok_or(FieldError::Empty)?;
     for (point, &source) in nearest.iter().enumerate() {
         points[point].touching = points[source].in_contact;
     }
@@ -116,7 +120,7 @@ pub(super) fn plausible(column: &'static str, point: usize, value: f64) -> Resul
 
 /// For each grid point the nearest one that was computed, in steps along the axes; itself if it was. `None` if none
 /// was.
-fn nearest_present(lattice: &Lattice, points: &[Point]) -> Option<Vec<usize>> {
+fn nearest_present(grid: &Grid, points: &[Point]) -> Option<Vec<usize>> {
     let mut nearest: Vec<Option<usize>> = vec![None; points.len()];
     let mut queue = VecDeque::new();
     // Points in contact come first: where both are as near, the absent point counts as in contact.
@@ -129,12 +133,10 @@ fn nearest_present(lattice: &Lattice, points: &[Point]) -> Option<Vec<usize>> {
         }
     }
     while let Some(point) = queue.pop_front() {
-        for (count, _, stride) in lattice.lines() {
-            for neighbour in Lattice::neighbours(point, count, stride).into_iter().flatten() {
-                if nearest[neighbour].is_none() {
-                    nearest[neighbour] = nearest[point];
-                    queue.push_back(neighbour);
-                }
+        for neighbour in grid.neighbours(point).flatten().flatten() {
+            if nearest[neighbour].is_none() {
+                nearest[neighbour] = nearest[point];
+                queue.push_back(neighbour);
             }
         }
     }
@@ -151,18 +153,16 @@ pub(super) struct Generations {
 
 impl Generations {
     /// Counts the steps, outwards from what is known.
-    pub fn new(lattice: &Lattice, known: impl Fn(usize) -> bool) -> Self {
-        let mut steps: Vec<u32> = (0..lattice.points()).map(|p| if known(p) { 0 } else { u32::MAX }).collect();
-        let mut queue: VecDeque<usize> = (0..lattice.points()).filter(|&p| steps[p] == 0).collect();
+    pub fn new(grid: &Grid, known: impl Fn(usize) -> bool) -> Self {
+        let mut steps: Vec<u32> = (0..grid.points()).map(|p| if known(p) { 0 } else { u32::MAX }).collect();
+        let mut queue: VecDeque<usize> = (0..grid.points()).filter(|&p| steps[p] == 0).collect();
         let mut outwards = Vec::new();
         while let Some(point) = queue.pop_front() {
-            for (count, _, stride) in lattice.lines() {
-                for neighbour in Lattice::neighbours(point, count, stride).into_iter().flatten() {
-                    if steps[neighbour] == u32::MAX {
-                        steps[neighbour] = steps[point] + 1;
-                        queue.push_back(neighbour);
-                        outwards.push(neighbour);
-                    }
+            for neighbour in grid.neighbours(point).flatten().flatten() {
+                if steps[neighbour] == u32::MAX {
+                    steps[neighbour] = steps[point] + 1;
+                    queue.push_back(neighbour);
+                    outwards.push(neighbour);
                 }
             }
         }
@@ -171,9 +171,9 @@ impl Generations {
 
     /// The neighbours of `point` that are one step nearer to what is known: axis, distance of `point` from them along
     /// it (with its sign), and point.
-    pub fn nearer<'a>(&'a self, lattice: &'a Lattice, point: usize) -> impl Iterator<Item = (usize, f64, usize)> + 'a {
-        lattice.lines().enumerate().flat_map(move |(axis, (count, step, stride))| {
-            let [before, after] = Lattice::neighbours(point, count, stride);
+    pub fn nearer<'a>(&'a self, grid: &'a Grid, point: usize) -> impl Iterator<Item = (usize, f64, usize)> + 'a {
+        grid.neighbours(point).enumerate().flat_map(move |(axis, [before, after])| {
+            let step = grid.axes[axis].step;
             let nearer = move |p: &usize| self.steps[*p] < self.steps[point];
             let before = before.filter(nearer).map(|p| (axis, step, p));
             before.into_iter().chain(after.filter(nearer).map(|p| (axis, -step, p)))

@@ -30,10 +30,14 @@ use super::{
     FieldError,
     hermite::Hermite,
     points::{Checked, Generations},
-    stencil::{Lattice, Stencil},
     stiffness::Stiffness,
 };
-use crate::{JointVector, contact::RESIDUAL_FLOOR, memory};
+use crate::{
+    JointVector,
+    contact::RESIDUAL_FLOOR,
+    dataset::{Grid, Stencil},
+    memory,
+};
 use rayon::prelude::*;
 
 /// Least stored energy over that of free space whose square root is distinguished from zero (J): a nanonewton over a
@@ -65,11 +69,11 @@ impl Potential {
         if data.dataset.energy.is_none() {
             return Err(FieldError::Missing { column: "energy", interpolation: "potential" });
         }
-        let (lattice, count) = (data.lattice, data.points.len());
-        memory::check(Hermite::bytes(lattice))?;
+        let (grid, count) = (&data.dataset.grid, data.points.len());
+        memory::check(Hermite::bytes(grid))?;
         let is_free = |p: &usize| data.points[*p].is_present() && !data.points[*p].in_contact;
         let free_energy = (0..count).find(is_free).map_or(Ok(0.0), |point| data.energy(point))?;
-        let zeros = JointVector::zeros(lattice.joints());
+        let zeros = JointVector::zeros(grid.joints());
         let mut root = vec![0.0; count];
         let mut known = vec![false; count];
         for point in 0..count {
@@ -83,21 +87,21 @@ impl Potential {
         }
         let mut slopes = vec![zeros; count];
         for point in (0..count).filter(|&point| known[point]) {
-            for (a, (lines, step, stride)) in lattice.lines().enumerate() {
+            for (a, axis) in grid.axes.iter().enumerate() {
                 slopes[point][a] = if data.points[point].is_converged() {
                     -data.torque(point, &zeros)?[a] / root[point]
                 } else {
-                    let [before, after] = Lattice::neighbours(point, lines, stride).map(|p| p.filter(|&p| known[p]));
+                    let [before, after] = grid.beside(point, a).map(|p| p.filter(|&p| known[p]));
                     let apart = f64::from(u8::from(before.is_some()) + u8::from(after.is_some()));
                     let rise = root[after.unwrap_or(point)] - root[before.unwrap_or(point)];
-                    if apart > 0.0 { rise / (apart * step) } else { 0.0 }
+                    if apart > 0.0 { rise / (apart * axis.step) } else { 0.0 }
                 };
             }
         }
-        let generations = Generations::new(lattice, |point| known[point]);
+        let generations = Generations::new(grid, |point| known[point]);
         for &point in &generations.outwards {
             let (mut value, mut slope, mut sources) = (0.0, zeros, 0.0);
-            for (axis, distance, source) in generations.nearer(lattice, point) {
+            for (axis, distance, source) in generations.nearer(grid, point) {
                 value += root[source] + distance * slopes[source][axis];
                 slope.iter_mut().zip(slopes[source].iter()).for_each(|(sum, slope)| *sum += slope);
                 sources += 1.0;
@@ -113,7 +117,7 @@ impl Potential {
             let tangent = f64::from(data.tangent(point).filter(|_| known[point])?[row * (row + 1) / 2 + column]);
             Some((-tangent - slopes[point][a] * slopes[point][b]) / root[point])
         };
-        Ok(Self { root: Hermite::new(lattice, &root, &slopes, mixed), free_energy })
+        Ok(Self { root: Hermite::new(grid, &root, &slopes, mixed), free_energy })
     }
 
     /// The potential in the cell of `stencil`. `N = 4^(D-1)`.
@@ -129,13 +133,13 @@ impl Potential {
 
     /// Returns the greatest bound of the stiffness relative to `slopes` over all cells:
     /// `d^2 U / dq_a dq_b = w_a w_b + w w_ab` where w is positive, each factor by its bound over the cell.
-    pub fn steepest(&self, lattice: &Lattice, slopes: &JointVector) -> Stiffness {
+    pub fn steepest(&self, grid: &Grid, slopes: &JointVector) -> Stiffness {
         let of_cell = |point: usize| {
-            let Some(w) = self.root.bounds(lattice, point).filter(|w| w.greatest > 0.0) else {
+            let Some(w) = self.root.bounds(grid, point).filter(|w| w.greatest > 0.0) else {
                 return Stiffness::default();
             };
             Stiffness::new(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b])
         };
-        (0..lattice.points()).into_par_iter().map(of_cell).reduce(Stiffness::default, Stiffness::max)
+        (0..grid.points()).into_par_iter().map(of_cell).reduce(Stiffness::default, Stiffness::max)
     }
 }

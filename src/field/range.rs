@@ -21,12 +21,11 @@
 use super::{
     FieldError,
     points::{self, Generations, plausible},
-    stencil::Lattice,
 };
 use crate::{
     JointVector, MAX_JOINTS,
     contact::Status,
-    dataset::Dataset,
+    dataset::{Axis, Dataset, Grid},
     proxy::{Chain, Node},
 };
 use glam::DVec3;
@@ -43,7 +42,7 @@ pub type Stops = [[f64; 2]; MAX_JOINTS];
 
 /// The haptized range of a dataset.
 pub struct HaptizedRange {
-    lattice: Lattice,
+    grid: Grid,
     ends: Stops,
     /// Absent where nothing beyond the grid is known or can be reached.
     beyond: Option<Beyond>,
@@ -61,21 +60,21 @@ struct Beyond {
     object: Option<Surroundings>,
 }
 
-/// Raises `clearances` at the points of `lattice` to the greatest `clearance_p - sum_a r_a |q_a - q_pa|` over all
+/// Raises `clearances` at the points of `grid` to the greatest `clearance_p - sum_a r_a |q_a - q_pa|` over all
 /// points p, r in `levers`: axis by axis, there and back.
-fn spread(lattice: &Lattice, levers: &JointVector, clearances: &mut [f32]) {
-    for ((count, step, stride), lever) in lattice.lines().zip(levers.iter()) {
-        let loss = (step * lever) as f32;
+fn spread(grid: &Grid, levers: &JointVector, clearances: &mut [f32]) {
+    for (a, (axis, lever)) in grid.axes.iter().zip(levers.iter()).enumerate() {
+        let loss = (axis.step * lever) as f32;
         let mut raise = |point: usize, from: Option<usize>| {
             if let Some(from) = from {
                 clearances[point] = clearances[point].max(clearances[from] - loss);
             }
         };
-        for point in 0..lattice.points() {
-            raise(point, Lattice::neighbours(point, count, stride)[0]);
+        for point in 0..grid.points() {
+            raise(point, grid.beside(point, a)[0]);
         }
-        for point in (0..lattice.points()).rev() {
-            raise(point, Lattice::neighbours(point, count, stride)[1]);
+        for point in (0..grid.points()).rev() {
+            raise(point, grid.beside(point, a)[1]);
         }
     }
 }
@@ -90,10 +89,10 @@ struct Surroundings {
 impl HaptizedRange {
     /// The grid alone: nothing is known beyond.
     #[must_use]
-    pub fn of_grid(lattice: &Lattice) -> Self {
+    pub fn of_grid(grid: &Grid) -> Self {
         let mut ends = [[0.0; 2]; MAX_JOINTS];
-        ends.iter_mut().zip(lattice.ends()).for_each(|(to, ends)| *to = ends);
-        Self { lattice: lattice.clone(), ends, beyond: None }
+        ends.iter_mut().zip(&grid.axes).for_each(|(ends, axis)| *ends = [axis.start, axis.last()]);
+        Self { grid: grid.clone(), ends, beyond: None }
     }
 
     /// The range of `dataset`, with the free space that `chain` can reach beyond its grid.
@@ -101,8 +100,9 @@ impl HaptizedRange {
     /// # Errors
     /// When the dataset is not consistent, or a gap is not a number.
     pub fn new(dataset: &Dataset, chain: &Chain) -> Result<Self, FieldError> {
-        let lattice = Lattice::new(&dataset.grid)?;
-        let mut range = Self::of_grid(&lattice);
+        let grid = &dataset.grid;
+        grid.check().map_err(FieldError::Grid)?;
+        let mut range = Self::of_grid(grid);
         let mut open = [false; MAX_JOINTS];
         let mut reached = range.ends;
         for ((open, reached), joint) in open.iter_mut().zip(&mut reached).zip(&chain.joints) {
@@ -111,26 +111,26 @@ impl HaptizedRange {
         }
         let is_known = dataset.status.iter().any(|&number| number != Status::Outside as u8);
         if open.contains(&true) && (is_known || dataset.refinement.is_none()) {
-            let (points, nearest) = points::survey(&lattice, dataset)?;
+            let (points, nearest) = points::survey(dataset)?;
             range.beyond = Some(match &dataset.gap {
                 Some(gap) => {
                     let clearance = |(point, &gap): (usize, &f32)| {
                         plausible("gap", point, gap.into())?;
                         Ok(if dataset.status(point) == Status::Free { gap.max(0.0) } else { 0.0 })
                     };
-                    let mut levers = JointVector::zeros(lattice.joints());
+                    let mut levers = JointVector::zeros(grid.joints());
                     for bounds in chain.jacobian_bounds(&reached) {
                         levers.iter_mut().zip(bounds.iter()).for_each(|(lever, bound)| *lever = lever.max(*bound));
                     }
                     let mut clearances =
                         gap.iter().enumerate().map(clearance).collect::<Result<Vec<f32>, FieldError>>()?;
-                    spread(&lattice, &levers, &mut clearances);
+                    spread(grid, &levers, &mut clearances);
                     Beyond { open, clearances, levers, object: Surroundings::new(dataset, chain) }
                 }
                 None => {
-                    let steps = Generations::new(&lattice, |point| points[nearest[point]].in_contact).steps;
-                    let mut levers = JointVector::zeros(lattice.joints());
-                    levers.iter_mut().zip(lattice.lines()).for_each(|(lever, (_, step, _))| *lever = 1.0 / step);
+                    let steps = Generations::new(grid, |point| points[nearest[point]].in_contact).steps;
+                    let mut levers = JointVector::zeros(grid.joints());
+                    levers.iter_mut().zip(&grid.axes).for_each(|(lever, axis)| *lever = 1.0 / axis.step);
                     let clearances = steps.into_iter().map(|steps| steps as f32).collect();
                     Beyond { open, clearances, levers, object: None }
                 }
@@ -177,20 +177,21 @@ impl HaptizedRange {
 
     /// Whether `x` is in the grid, but for rounding.
     fn contains(&self, x: &JointVector) -> bool {
-        let within = |((x, [least, greatest]), (_, step, _)): ((&f64, [f64; 2]), (usize, f64, usize))| {
-            (least - RIM * step..=greatest + RIM * step).contains(x)
+        let within = |((x, [least, greatest]), axis): ((&f64, [f64; 2]), &Axis)| {
+            (least - RIM * axis.step..=greatest + RIM * axis.step).contains(x)
         };
-        x.iter().zip(self.ends).zip(self.lattice.lines()).all(within)
+        x.iter().zip(self.ends).zip(&self.grid.axes).all(within)
     }
 }
 
 impl Beyond {
     /// c at `x` of `range`; zero where x is so far within the grid that no step leaves it.
     fn clearance(&self, range: &HaptizedRange, x: &JointVector) -> f64 {
-        let stencil = range.lattice.locate(x);
+        let stencil = range.grid.locate(x);
         let mut travel = 0.0;
         let (mut sides, mut near) = ([[0.0; 2]; MAX_JOINTS], false);
-        for (a, (_, step, _)) in range.lattice.lines().enumerate() {
+        for (a, axis) in range.grid.axes.iter().enumerate() {
+            let step = axis.step;
             let [least, greatest] = range.ends[a];
             near |= self.open[a] && !(x[a] > least + step && x[a] < greatest - step);
             let fraction = stencil.fractions[a];

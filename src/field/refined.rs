@@ -7,19 +7,19 @@
 use super::{
     Flags, Sample,
     bernstein::{Bernstein, Bounds, place},
-    stencil::Lattice,
     stiffness::Stiffness,
 };
 use crate::{
     JointVector, MAX_JOINTS,
+    dataset::Grid,
     store::{Order, Place, Store, beyond, record::sets},
 };
 use rayon::prelude::*;
 
 /// The field at `q`, of the first `horizon` blocks, and the levels whose cell around `q` is whole.
-pub(super) fn sample(lattice: &Lattice, store: &Store, q: &[f64], horizon: u64) -> (Sample, u32) {
+pub(super) fn sample(grid: &Grid, store: &Store, q: &[f64], horizon: u64) -> (Sample, u32) {
     let root = store.sample_within(q, horizon);
-    let fade = lattice.fade(q);
+    let fade = grid.fade(q);
     let mut flags = Flags::empty();
     flags.set(Flags::OUTSIDE, fade < 1.0);
     flags.set(Flags::ABSENT, root.whole == 0);

@@ -1,6 +1,6 @@
-//! How the torque changes with the configuration, and columns that only a look at the dataset needs.
+//! How the torque changes with the configuration.
 
-use super::{TorqueField, stencil::Lattice};
+use super::TorqueField;
 use crate::MAX_JOINTS;
 
 /// Step of the differences that give the slope of an interpolated torque, over the grid's own step (1): the cube root
@@ -16,8 +16,8 @@ impl TorqueField {
         let joints = self.joints();
         let mut place = [0.0; MAX_JOINTS];
         place[..joints].copy_from_slice(&q[..joints]);
-        for (l, (_, step, _)) in self.lattice.lines().enumerate() {
-            let ends = [q[l] - GRADIENT_STEP * step, q[l] + GRADIENT_STEP * step];
+        for (l, axis) in self.grid.axes.iter().enumerate() {
+            let ends = [q[l] - GRADIENT_STEP * axis.step, q[l] + GRADIENT_STEP * axis.step];
             let [before, after] = ends.map(|end| {
                 place[l] = end;
                 self.sample(&place[..joints]).torque
@@ -28,19 +28,6 @@ impl TorqueField {
                 slope[k * joints + l] = if ends[0] < ends[1] { (after - before) / (ends[1] - ends[0]) } else { 0.0 };
             }
         }
-    }
-}
-
-impl Lattice {
-    /// Multilinear interpolation of `column`, one entry a grid point, at `q`; not a number outside the grid, where
-    /// nothing is known.
-    #[must_use]
-    pub fn interpolate(&self, column: &[f32], q: &[f64]) -> f64 {
-        let stencil = self.locate(q);
-        if stencil.fade < 1.0 {
-            return f64::NAN;
-        }
-        stencil.corners().map(|(point, weight)| weight * f64::from(column[point])).sum()
     }
 }
 
@@ -68,21 +55,6 @@ mod tests {
             assert!(slope.iter().all(|entry| (entry - expected).abs() < 8.0 * rounding), "{slope:?}");
             field.slope(&vec![-0.43; joints], &mut slope);
             assert!(slope.iter().all(|entry| *entry == 0.0), "{slope:?}");
-        }
-    }
-
-    #[test]
-    fn a_column_is_interpolated_inside_the_grid_and_unknown_outside() {
-        let grid = grid(&[(0.0, 0.5, 3), (-1.0, 0.25, 5)]);
-        let plane = |q: &[f64]| 3.0 * q[0] - 2.0 * q[1] + 0.5;
-        let column: Vec<f32> = (0..grid.points()).map(|point| plane(&grid.configuration(point)) as f32).collect();
-        let lattice = Lattice::new(&grid).unwrap();
-        for q in [[0.0, -1.0], [0.3, -0.4], [1.0, 0.0]] {
-            let found = lattice.interpolate(&column, &q);
-            assert!((found - plane(&q)).abs() < 1e-6, "{found} at {q:?}");
-        }
-        for q in [[1.1, 0.0], [0.3, -1.1], [f64::NAN, 0.0]] {
-            assert!(lattice.interpolate(&column, &q).is_nan(), "{q:?}");
         }
     }
 }

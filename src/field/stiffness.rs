@@ -1,6 +1,6 @@
 //! The stiffness of a torque field over a cell, and the cell where it is greatest.
 
-use crate::{JointVector, proxy::JointMatrix};
+use crate::{JointMatrix, JointVector};
 use std::sync::{Mutex, PoisonError};
 
 /// Bounds of the entries of d tau/d q over one cell (N m/rad, or what follows of prismatic joints).

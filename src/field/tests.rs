@@ -2,7 +2,10 @@
 
 use super::*;
 use crate::field::synthetic::{grid, half_space};
-use crate::{JointMatrix, contact::Status};
+use crate::{
+    contact::Status,
+    joint_matrix::{JointMatrix, add_symmetric},
+};
 
 /// So steep a layer that it holds nothing back.
 const SOFT: f64 = 1e6;
@@ -430,14 +433,14 @@ fn stiffness_of_a_potential_is_that_of_its_object() {
 /// Root w, its gradient and its second derivatives at `q`, of the energy `1/2 max(0, w)^2`: curved along every joint
 /// and every pair.
 fn wavy_root(q: &[f64]) -> (f64, JointVector, JointMatrix) {
-    let (mut w, mut slope, mut second) = (0.1, JointVector::zeros(q.len()), JointMatrix::zeros(q.len()));
+    let (mut w, mut slope, mut second) = (0.1, JointVector::zeros(q.len()), JointMatrix::default());
     for wave in 0..3 {
         let rate = |a: usize| 1.0 + (1.7 * (a as f64 + 1.0) * (f64::from(wave) + 1.0)).sin();
         let phase = f64::from(wave) + q.iter().enumerate().map(|(a, x)| rate(a) * x).sum::<f64>();
         w += 0.4 * phase.sin();
         for a in 0..q.len() {
             slope[a] += 0.4 * rate(a) * phase.cos();
-            (0..=a).for_each(|b| second.add(a, b, -0.4 * rate(a) * rate(b) * phase.sin()));
+            (0..=a).for_each(|b| add_symmetric(&mut second, a, b, -0.4 * rate(a) * rate(b) * phase.sin()));
         }
     }
     (w, slope, second)
@@ -501,7 +504,7 @@ fn tangents_make_a_potential_more_accurate_than_differences() {
         let mut tangents = Vec::new();
         for point in 0..data.grid.points() {
             let (w, slope, second) = wavy_root(&data.grid.configuration(point));
-            let entry = |a: usize, b: usize| (-slope[a] * slope[b] - w * second.at(a, b)) as f32;
+            let entry = |a: usize, b: usize| (-slope[a] * slope[b] - w * second[a][b]) as f32;
             tangents.extend((0..joints).flat_map(|a| (0..=a).map(move |b| (a, b))).map(|(a, b)| entry(a, b)));
         }
         let slope = vector(&vec![SOFT; joints]);

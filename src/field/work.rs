@@ -36,8 +36,8 @@ impl TorqueField {
     #[must_use]
     pub fn work(&self, from: &JointVector, to: &JointVector) -> f64 {
         let mut cuts = vec![0.0, 1.0];
-        for ((line, start), end) in self.lattice.grid_lines().zip(from.iter()).zip(to.iter()) {
-            let crossed = line.map(|coordinate| (coordinate - start) / (end - start));
+        for ((axis, start), end) in self.grid.axes.iter().zip(from.iter()).zip(to.iter()) {
+            let crossed = (0..axis.count).map(|k| (axis.coordinate(k) - start) / (end - start));
             cuts.extend(crossed.filter(|cut| *cut > 0.0 && *cut < 1.0));
         }
         cuts.sort_unstable_by(f64::total_cmp);

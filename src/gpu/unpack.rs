@@ -9,13 +9,14 @@
 
 use super::{model::stiffness, precision::Precision, stages::Found};
 use crate::{
-    JointMatrix, JointVector,
+    JointVector,
     contact::{
         self, Equilibrium, MINIMUM_SQUARE, NodeForce, Status,
         equilibrium::energy::StoppingCriteria,
         geometry::closest_point::{ClosestPoint, Feature},
         law::depth::Carriers,
     },
+    joint_matrix::{JointMatrix, add_symmetric},
     scene::Algorithm,
 };
 use glam::DVec3;
@@ -62,8 +63,8 @@ pub(super) fn unpack(
         }
     }
     if flags & HAS_TANGENT != 0 {
-        let mut matrix = JointMatrix::zeros(q.len());
-        (0..q.len()).for_each(|k| (0..=k).for_each(|l| matrix.add(k, l, tangent[q.len() * k + l])));
+        let mut matrix = JointMatrix::default();
+        (0..q.len()).for_each(|k| (0..=k).for_each(|l| add_symmetric(&mut matrix, k, l, tangent[q.len() * k + l])));
         result.tangent = Some(matrix);
     }
     add_up(parts, &mut result);

@@ -11,9 +11,9 @@
 //! The Christoffel matrix is `C_ij = 1/2 sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) v_k`: its symmetric part is half
 //! of `Mdot`, its skew part `1/2 (W - W^T)` with `W_ij = sum_k dM_ik/dq_j v_k`.
 
-use super::{Chain, JointMatrix, Links};
+use super::{Chain, Links};
 use crate::scene::JointKind;
-use crate::{JointVector, MAX_JOINTS};
+use crate::{JointMatrix, JointVector, MAX_JOINTS};
 use glam::{DMat3, DVec3};
 
 /// M and its change at one configuration and one velocity.

@@ -7,11 +7,8 @@
 
 use super::{Chain, Pose};
 use crate::scene::JointKind;
-use crate::{JointVector, MAX_JOINTS};
+use crate::{JointMatrix, MAX_JOINTS};
 use glam::DVec3;
-
-/// A square matrix over the joints: the first d rows and columns count, the others are zero.
-pub type JointMatrix = [[f64; MAX_JOINTS]; MAX_JOINTS];
 
 impl Chain {
     /// Inertia M at `pose`, symmetric positive definite (kg m^2; kg m or kg where prismatic joints take part).
@@ -48,52 +45,6 @@ impl Chain {
             JointKind::Prismatic => DVec3::ZERO,
         }
     }
-}
-
-/// Returns the lower Cholesky factor of the leading `joints` rows and columns; `None` if they are not positive
-/// definite. Allocates nothing.
-#[must_use]
-pub fn cholesky(matrix: &JointMatrix, joints: usize) -> Option<JointMatrix> {
-    let mut factor = [[0.0; MAX_JOINTS]; MAX_JOINTS];
-    for i in 0..joints {
-        for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            let entry = matrix[i][j] - sum;
-            if i == j {
-                // Also false for what is not a number.
-                if !(entry > 0.0 && entry.is_finite()) {
-                    return None;
-                }
-                factor[i][i] = entry.sqrt();
-            } else {
-                factor[i][j] = entry / factor[j][j];
-            }
-        }
-    }
-    Some(factor)
-}
-
-/// `vector <- L^-T vector`.
-pub fn solve_transposed(factor: &JointMatrix, vector: &mut JointVector) {
-    let joints = vector.len();
-    for i in (0..joints).rev() {
-        let sum: f64 = (i + 1..joints).map(|j| factor[j][i] * vector[j]).sum();
-        vector[i] = (vector[i] - sum) / factor[i][i];
-    }
-}
-
-/// Solves `M x = b` in place; x is NaN if M is not positive definite, as every inertia with positive rotor inertias is.
-/// Allocates nothing.
-pub fn solve_positive(matrix: &JointMatrix, b: &mut JointVector) {
-    let Some(factor) = cholesky(matrix, b.len()) else {
-        b.iter_mut().for_each(|entry| *entry = f64::NAN);
-        return;
-    };
-    for i in 0..b.len() {
-        let sum: f64 = (0..i).map(|k| factor[i][k] * b[k]).sum();
-        b[i] = (b[i] - sum) / factor[i][i];
-    }
-    solve_transposed(&factor, b);
 }
 
 #[cfg(test)]

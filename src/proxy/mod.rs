@@ -18,5 +18,4 @@ mod random;
 pub use chain::{Chain, Node, Pose};
 pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere};
 pub use dynamics::Dynamics;
-pub use inertia::{JointMatrix, cholesky, solve_positive, solve_transposed};
 pub use links::Links;

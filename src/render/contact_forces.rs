@@ -45,7 +45,7 @@ impl ContactForces {
             Some(surface) if solved => Source::Solved(Mutex::new(AtTheProxy::new(dataset, surface, nodes)?)),
             _ => {
                 let contacts = dataset.contacts.as_ref().ok_or(GraphicsError::NoForces)?;
-                let rows = ForceRows::new(&dataset.grid, contacts, nodes)?.ok_or(GraphicsError::Rows { nodes })?;
+                let rows = ForceRows::new(&dataset.grid, contacts, nodes).ok_or(GraphicsError::Rows { nodes })?;
                 Source::Stored(Box::new(rows))
             }
         };

@@ -1,14 +1,11 @@
 //! Contact forces of a dataset's grid points, copied out of its file: compressed rows, interpolated between the points.
 
-use crate::{
-    dataset::{Contacts, Grid},
-    field::stencil::{Lattice, LatticeError},
-};
+use crate::dataset::{Contacts, Grid};
 use glam::DVec3;
 
 /// Contact forces on the nodes of the object, or on those of the proxy.
 pub struct ForceRows {
-    lattice: Lattice,
+    grid: Grid,
     /// One more than there are grid points.
     offsets: Vec<usize>,
     nodes: Vec<u32>,
@@ -17,29 +14,25 @@ pub struct ForceRows {
 }
 
 impl ForceRows {
-    /// The forces `contacts` over `grid`, on `nodes` nodes; `None` where they do not fit.
-    ///
-    /// # Errors
-    /// When the grid is none.
-    pub fn new(grid: &Grid, contacts: &Contacts, nodes: usize) -> Result<Option<Self>, LatticeError> {
-        let lattice = Lattice::new(grid)?;
+    /// The forces `contacts` over `grid`, on `nodes` nodes; `None` where they do not fit, or the grid is none.
+    pub fn new(grid: &Grid, contacts: &Contacts, nodes: usize) -> Option<Self> {
         let count = contacts.nodes.len();
         let offsets: Vec<usize> = contacts.offsets.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
-        let fits = offsets.len() == lattice.points() + 1
+        let fits = grid.check().is_ok_and(|points| offsets.len() == points + 1)
             && offsets.is_sorted()
             && offsets.last() == Some(&count)
             && contacts.forces.len() == 3 * count
             && contacts.nodes.iter().all(|&node| (node as usize) < nodes)
             && contacts.forces.iter().all(|f| f.is_finite());
         let forces = || contacts.forces.as_chunks().0.to_vec();
-        Ok(fits.then(|| Self { lattice, offsets, nodes: contacts.nodes.to_vec(), forces: forces() }))
+        fits.then(|| Self { grid: grid.clone(), offsets, nodes: contacts.nodes.to_vec(), forces: forces() })
     }
 
     /// Calls `add` with each node that has a force at a corner of the cell around `q`: with the corner's weight times
     /// `share`, where that is above zero, and the force there (N).
     #[inline]
     pub(super) fn at(&self, q: &[f64], share: f64, mut add: impl FnMut(usize, f64, DVec3)) {
-        for (point, weight) in self.lattice.locate(q).corners() {
+        for (point, weight) in self.grid.locate(q).corners() {
             let scale = share * weight;
             if scale > 0.0 {
                 let row = self.offsets[point]..self.offsets[point + 1];

@@ -1,14 +1,11 @@
 //! Why an object cannot be drawn.
 
-use crate::{field::stencil::LatticeError, object::FactorError};
+use crate::object::FactorError;
 
 /// The object cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraphicsError {
-    /// The dataset's grid is none.
-    #[error(transparent)]
-    Grid(#[from] LatticeError),
     /// The dataset has no contact forces.
     #[error("the dataset holds no contact forces: name [graphics] in its scene and bake it again")]
     NoForces,

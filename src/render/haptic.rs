@@ -130,7 +130,7 @@ impl Haptics {
         let channels = spec.four_channel.map(|channels| Channels::new(channels, spec));
         let control = PassivityControl::new(spec);
         Ok(Self {
-            range: HaptizedRange::of_grid(field.lattice()),
+            range: HaptizedRange::of_grid(field.grid()),
             field,
             npmi,
             coupling,

@@ -218,8 +218,7 @@ impl OnDemand {
 
     /// Greatest lever of each joint over the contact nodes (m/rad or 1).
     fn levers(&self) -> JointVector {
-        let ranges: Vec<[f64; 2]> =
-            self.grid.axes.iter().map(|axis| [axis.start, axis.coordinate(axis.count.saturating_sub(1))]).collect();
+        let ranges: Vec<[f64; 2]> = self.grid.axes.iter().map(|axis| [axis.start, axis.last()]).collect();
         let mut levers = JointVector::zeros(self.grid.joints());
         for bounds in self.chain.jacobian_bounds(&ranges) {
             levers.iter_mut().zip(bounds.iter()).for_each(|(lever, bound)| *lever = lever.max(*bound));

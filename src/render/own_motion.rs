@@ -92,10 +92,8 @@ impl<'a> Search<'a> {
 
     /// Returns the neighbour of `point`, if there is one to go to: at the grid's border the proxy would be held.
     fn next(&self, point: usize, Along { joint, upwards }: Along) -> Option<usize> {
-        let mut lines = self.grid.lines(point);
-        let next = if upwards { lines[joint] + 1 } else { lines[joint].checked_sub(1)? };
-        lines[joint] = next;
-        is_inside(self.grid.axes[joint].count, next).then(|| self.grid.point(lines))
+        let next = self.grid.beside(point, joint)[usize::from(upwards)]?;
+        is_inside(self.grid.axes[joint].count, self.grid.lines(next)[joint]).then_some(next)
     }
 
     /// Returns the free point that is reached from `point` without leaving contact before, and its distance in points.

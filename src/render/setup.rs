@@ -257,7 +257,7 @@ pub fn border_stiffness(gains: &HapticsSpec, grid: &Grid) -> String {
 fn centre(grid: &Grid) -> JointVector {
     let mut q = JointVector::zeros(grid.joints());
     for (q, axis) in q.iter_mut().zip(&grid.axes) {
-        *q = 0.5 * (axis.coordinate(0) + axis.coordinate(axis.count.saturating_sub(1)));
+        *q = 0.5 * (axis.start + axis.last());
     }
     q
 }

@@ -9,7 +9,6 @@
 use crate::{
     contact::Status,
     dataset::Dataset,
-    field::stencil::{Lattice, LatticeError},
     gridize::{GridizeError, GridizeOptions, Samples, gridize},
 };
 
@@ -52,8 +51,8 @@ pub enum PredictionError {
         dataset: usize,
     },
     /// The grid cannot be looked up.
-    #[error(transparent)]
-    Lattice(#[from] LatticeError),
+    #[error("{0}")]
+    Grid(String),
 }
 
 /// Leaves out `share` of `samples` and predicts them by a dataset of the rest.
@@ -73,7 +72,7 @@ pub fn held_out(samples: &Samples, options: &GridizeOptions, share: f64) -> Resu
 /// # Errors
 /// When their joints are not the dataset's.
 pub fn predict(dataset: &Dataset, samples: &Samples) -> Result<Prediction, PredictionError> {
-    let lattice = Lattice::new(&dataset.grid)?;
+    dataset.grid.check().map_err(PredictionError::Grid)?;
     let joints = dataset.grid.joints();
     if samples.joints.len() != joints {
         return Err(PredictionError::Joints { samples: samples.joints.len(), dataset: joints });
@@ -83,7 +82,7 @@ pub fn predict(dataset: &Dataset, samples: &Samples) -> Result<Prediction, Predi
     found.worst = vec![0.0; joints];
     for sample in 0..samples.len() {
         let row = sample * joints..(sample + 1) * joints;
-        let Some(torque) = predicted(dataset, &lattice, &samples.configurations[row.clone()]) else { continue };
+        let Some(torque) = predicted(dataset, &samples.configurations[row.clone()]) else { continue };
         found.predicted += 1;
         for (joint, (torque, measured)) in torque.iter().zip(&samples.torques[row.clone()]).enumerate() {
             let error = torque - measured;
@@ -101,8 +100,8 @@ pub fn predict(dataset: &Dataset, samples: &Samples) -> Result<Prediction, Predi
 }
 
 /// Torque at `q` as rendering interpolates it; `None` where not all points around are inside the measured region.
-fn predicted(dataset: &Dataset, lattice: &Lattice, q: &[f64]) -> Option<Vec<f64>> {
-    let stencil = lattice.locate(q);
+fn predicted(dataset: &Dataset, q: &[f64]) -> Option<Vec<f64>> {
+    let stencil = dataset.grid.locate(q);
     let mut torque = vec![0.0; q.len()];
     for (point, weight) in stencil.corners().filter(|(_, weight)| *weight > 0.0) {
         if stencil.fade < 1.0 || dataset.status(point) == Status::Outside {

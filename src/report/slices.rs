@@ -111,10 +111,9 @@ impl Slice {
 
     /// `point` moved to index zero on both axes.
     fn origin(dataset: &Dataset, axes: [usize; 2], point: usize) -> usize {
-        axes.iter().fold(point, |point, &axis| {
-            let pitch = pitch(dataset, axis);
-            point - point / pitch % dataset.grid.axes[axis].count * pitch
-        })
+        let mut lines = dataset.grid.lines(point);
+        axes.iter().for_each(|&axis| lines[axis] = 0);
+        dataset.grid.point(lines)
     }
 
     /// Cells drawn across and up.
@@ -124,8 +123,9 @@ impl Slice {
 
     /// Grid point of a cell.
     fn point(&self, dataset: &Dataset, cell: [usize; 2]) -> usize {
-        let steps = [0, 1].map(|side| cell[side] * self.strides[side] * pitch(dataset, self.axes[side]));
-        self.origin + steps[0] + steps[1]
+        let mut lines = dataset.grid.lines(self.origin);
+        [0, 1].into_iter().for_each(|side| lines[self.axes[side]] = cell[side] * self.strides[side]);
+        dataset.grid.point(lines)
     }
 
     fn draw(&self, canvas: &mut Canvas, dataset: &Dataset, joint: usize, area: Area) {
@@ -254,11 +254,6 @@ impl Slice {
         }
         plot::legend(canvas, (WIDTH - 4.0, chart::MARGIN + 32.0), &entries);
     }
-}
-
-/// Distance between neighbours along an axis, in point numbers.
-fn pitch(dataset: &Dataset, axis: usize) -> usize {
-    dataset.grid.axes[axis + 1..].iter().map(|axis| axis.count).product()
 }
 
 /// Whether the chain has revolute and prismatic joints.

@@ -5,9 +5,9 @@
 //! the columns, in the order of `RESULTS`; those of offsets hold the end of each point's row within the block
 //! ```
 
-use crate::JointMatrix;
 use crate::contact::{Equilibrium, NodeForce, Status};
 use crate::dataset::{Axes, RESULTS, Stored};
+use crate::joint_matrix;
 use bytemuck::Pod;
 use std::collections::{BTreeMap, TryReserveError};
 
@@ -57,7 +57,7 @@ impl Width {
     pub fn numbers(self, array: Stored) -> usize {
         match array.description().axes {
             Axes::Joints(_) => self.joints,
-            Axes::Triangle(_) => usize::from(self.tangent) * JointMatrix::entries(self.joints),
+            Axes::Triangle(_) => usize::from(self.tangent) * joint_matrix::entries(self.joints),
             Axes::Grid => 1,
             Axes::Own(_) if array == Stored::TouchOffsets => self.touches.into(),
             Axes::Own(axes) => axes.iter().skip(1).map(|(_, length)| length).product(),
@@ -318,9 +318,11 @@ impl Columns {
             && on_proxy.is_sorted_by(|a, b| a.node < b.node)
             && on_proxy.iter().all(|contact| contact.force.as_vec3().is_finite());
         self.iterations.push(*iterations);
-        let tangent = tangent.filter(|tangent| sound && tangent.is_finite());
+        let tangent = tangent.filter(|tangent| sound && tangent.as_flattened().iter().all(|entry| entry.is_finite()));
         let entries = self.tangent.len() + shape.width().numbers(Stored::Tangent);
-        self.tangent.extend(tangent.iter().flat_map(JointMatrix::lower).map(|entry| entry as f32));
+        self.tangent.extend(
+            tangent.iter().flat_map(|tangent| joint_matrix::lower(tangent, shape.joints)).map(|entry| entry as f32),
+        );
         self.tangent.resize(entries, 0.0);
         if sound {
             self.torque.extend_from_slice(torque);

@@ -234,7 +234,7 @@ impl JacobianBounds {
         // The margin reaches beyond the grid.
         let range = |axis: &Axis| {
             let far = FreeSpace::MARGIN as f64 * axis.step;
-            [axis.coordinate(0) - far, axis.coordinate(axis.count - 1) + far]
+            [axis.coordinate(0) - far, axis.last() + far]
         };
         let ranges: Vec<[f64; 2]> = grid.axes.iter().map(range).collect();
         let bounds = chain.jacobian_bounds(&ranges);

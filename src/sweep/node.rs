@@ -21,6 +21,7 @@ use crate::{
     JointVector,
     contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
     field::{GRADIENT_STEP, LEAST_ENERGY},
+    joint_matrix,
     scene::{Algorithm, Interpolation, Scene},
     store::{
         Order, Space,
@@ -199,7 +200,8 @@ struct Begun {
 /// Begins the node at `q` with the equilibrium `here`.
 fn begin(solver: &mut Solver<'_>, q: &JointVector, here: &Equilibrium, scale: &Scale) -> Begun {
     if here.status.is_in_contact() && here.energy > LEAST_ENERGY {
-        let tangent: Option<Vec<f64>> = here.tangent.as_ref().map(|tangent| tangent.lower().collect());
+        let tangent: Option<Vec<f64>> =
+            here.tangent.as_ref().map(|tangent| joint_matrix::lower(tangent, q.len()).collect());
         return Begun { record: root_of(here.energy, &here.torque, tangent.as_deref()), behind: None };
     }
     let gap = here.gap.max(0.0);

@@ -111,13 +111,8 @@ fn touched(dataset: &Dataset, configurations: impl Iterator<Item = JointVector>)
 fn is_line_free(dataset: &Dataset, from: &JointVector, to: &JointVector) -> bool {
     let grid = &dataset.grid;
     line(grid, from, to).all(|q| {
-        let mut points = vec![0];
-        for (x, axis) in q.iter().zip(&grid.axes) {
-            let at = (x - axis.start) / axis.step;
-            let [low, high] = [at.floor(), at.ceil()].map(|line| line.clamp(0.0, (axis.count - 1) as f64) as usize);
-            points = points.iter().flat_map(|point| [low, high].map(|line| point * axis.count + line)).collect();
-        }
-        points.iter().all(|&point| dataset.status(point) == Status::Free)
+        let cell = grid.locate(&q);
+        cell.corners().all(|(point, weight)| weight == 0.0 || dataset.status(point) == Status::Free)
     })
 }
 

@@ -185,9 +185,7 @@ impl Slices {
         let Some((key, texture, _)) = &self.drawn else { return };
         let [across, up] = self.axes.map(|axis| &grid.axes[axis]);
         let single = grid.joints() == 1;
-        let extent = |axis: &crate::dataset::Axis| {
-            [axis.start - 0.5 * axis.step, axis.coordinate(axis.count - 1) + 0.5 * axis.step]
-        };
+        let extent = |axis: &crate::dataset::Axis| [axis.start - 0.5 * axis.step, axis.last() + 0.5 * axis.step];
         let ([left, right], [low, high]) = (extent(across), if single { [0.0, 1.0] } else { extent(up) });
         let image = PlotImage::new(
             "grid points",

@@ -30,7 +30,6 @@ const SHARED_NAMES: &[&str] = &[
     "Geometry",
     "Interpolation",
     "Joint",
-    "JointMatrix",
     "Kernel",
     "Keyboard",
     "Kind",

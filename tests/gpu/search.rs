@@ -6,6 +6,7 @@ use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status},
     gpu::{BatchCapacity, GpuSolver},
+    joint_matrix::lower,
     object::{Compliance, Object},
     proxy::Chain,
     scene::{Algorithm, ContactSpec, ContactSurface, Material, Scene, SpringKind, SpringSpec},
@@ -36,7 +37,9 @@ fn difference(cpu: &[Equilibrium], gpu: &[Equilibrium]) -> Option<String> {
     let greatest = |of: &dyn Fn(&Equilibrium) -> f64| cpu.iter().map(of).fold(0.0, f64::max);
     let torque = greatest(&|e| e.torque.norm());
     let energy = greatest(&|e| e.energy);
-    let size = |e: &Equilibrium| e.tangent.iter().flat_map(|tangent| tangent.lower().map(f64::abs)).fold(0.0, f64::max);
+    let size = |e: &Equilibrium| {
+        e.tangent.iter().flat_map(|tangent| lower(tangent, e.torque.len()).map(f64::abs)).fold(0.0, f64::max)
+    };
     let tangent = greatest(&size);
     for (k, (a, b)) in cpu.iter().zip(gpu).enumerate() {
         if (a.status, a.iterations, a.tangent.is_some()) != (b.status, b.iterations, b.tangent.is_some()) {
@@ -47,7 +50,9 @@ fn difference(cpu: &[Equilibrium], gpu: &[Equilibrium]) -> Option<String> {
             return Some(format!("{k}: touches of {:?}, {:?}", nodes(a), nodes(b)));
         }
         let off: f64 = a.torque.iter().zip(b.torque.iter()).map(|(a, b)| (a - b).powi(2)).sum();
-        let lower = |e: &Equilibrium| e.tangent.iter().flat_map(|t| t.lower().collect::<Vec<_>>()).collect::<Vec<_>>();
+        let lower = |e: &Equilibrium| {
+            e.tangent.iter().flat_map(|t| lower(t, e.torque.len()).collect::<Vec<_>>()).collect::<Vec<_>>()
+        };
         let bent = lower(a).iter().zip(lower(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let stored = (a.energy - b.energy).abs();
         if off.sqrt() > AGREEMENT * torque || stored > AGREEMENT * energy || bent > AGREEMENT * tangent {

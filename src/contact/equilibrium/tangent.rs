@@ -10,11 +10,11 @@
 //! `d^2 x_i / dq_k dq_l = a_k x J_il` for k <= l where joint k is revolute, and zero where it is prismatic.
 
 use super::newton::Newton;
-use crate::JointMatrix;
 use crate::contact::law::depth::Variation;
 use crate::contact::law::springs::Springs;
 use crate::contact::linear::support::{Support, dot};
 use crate::contact::model::Model;
+use crate::joint_matrix::{JointMatrix, add_symmetric};
 use crate::proxy::Pose;
 use crate::scene::JointKind;
 use glam::DVec3;
@@ -35,7 +35,7 @@ pub(super) fn tangent(
 ) -> Option<JointMatrix> {
     let joints = model.chain.joints.len();
     let order = support.order();
-    let mut tangent = JointMatrix::zeros(joints);
+    let mut tangent = JointMatrix::default();
     // E_uq, column by column.
     let mut loads = vec![vec![0.0; order]; joints];
     for (row, contact) in springs.contacts.iter().enumerate().filter(|(_, contact)| contact.is_active()) {
@@ -50,7 +50,7 @@ pub(super) fn tangent(
                     JointKind::Revolute => pose.axes[l].cross(*column),
                     JointKind::Prismatic => DVec3::ZERO,
                 };
-                tangent.add(k, l, reaction.point.dot(*other) + force.dot(turn));
+                add_symmetric(&mut tangent, k, l, reaction.point.dot(*other) + force.dot(turn));
             }
         }
     }
@@ -61,7 +61,7 @@ pub(super) fn tangent(
         responses.push(moved.to_vec());
         for (l, (load, response)) in loads.iter().zip(&responses).enumerate() {
             // What the residual adds makes the error a product of those of both responses.
-            tangent.add(k, l, dot(load, moved) + dot(response, residual));
+            add_symmetric(&mut tangent, k, l, dot(load, moved) + dot(response, residual));
         }
     }
     Some(tangent)
@@ -70,6 +70,7 @@ pub(super) fn tangent(
 #[cfg(test)]
 mod tests {
     use crate::contact::{Model, Solver, Status};
+    use crate::joint_matrix::lower;
     use crate::object::Object;
     use crate::proxy::Chain;
     use crate::scene::Scene;
@@ -136,7 +137,7 @@ mod tests {
                     moved[l] += step;
                     solver.solve(&moved)
                 };
-                let size = tangent.lower().fold(0.0_f64, |size, entry| size.max(entry.abs()));
+                let size = lower(&tangent, q.len()).fold(0.0_f64, |size, entry| size.max(entry.abs()));
                 for l in 0..3 {
                     let (after, before) = (pressing(&mut solver, l, STEP), pressing(&mut solver, l, -STEP));
                     // At a kink, where contacts come and go or a closest feature changes, there is no derivative.
@@ -157,8 +158,8 @@ mod tests {
                         let force = (before.energy - after.energy) / (2.0 * STEP);
                         assert!((force - here.torque[l]).abs() < 1e-5 * size, "{q:?} {l}: {force} {:?}", here.torque);
                         let slope = (after.torque[k] - before.torque[k]) / (2.0 * STEP);
-                        assert!((slope - tangent.at(k, l)).abs() < 1e-4 * size, "{q:?} {k} {l}: {slope} {tangent:?}");
-                        assert_eq!(tangent.at(k, l), tangent.at(l, k));
+                        assert!((slope - tangent[k][l]).abs() < 1e-4 * size, "{q:?} {k} {l}: {slope} {tangent:?}");
+                        assert_eq!(tangent[k][l], tangent[l][k]);
                         checked += 1;
                     }
                 }

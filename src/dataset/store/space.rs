@@ -24,14 +24,8 @@ pub const MOST_BLOCK_JOINTS: usize = 3;
 /// The lattice of all levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Space {
-    joints: usize,
+    base: Grid,
     levels: u32,
-    /// First coordinate of each axis (rad or m).
-    start: [f64; MAX_JOINTS],
-    /// Spacing of the base (rad or m).
-    step: [f64; MAX_JOINTS],
-    /// Cells of the base along each axis.
-    cells: [u32; MAX_JOINTS],
     /// Bits of a key for each coordinate.
     bits: u32,
     /// Logarithm of the nodes of a block along each axis: 1 or 0.
@@ -80,36 +74,26 @@ impl Space {
         base.check().map_err(SpaceError::Grid)?;
         let joints = base.joints();
         let bits = (u64::BITS - LEVEL_BITS) / joints as u32;
-        let mut space = Self {
-            joints,
-            levels: levels.max(1),
-            start: [0.0; MAX_JOINTS],
-            step: [0.0; MAX_JOINTS],
-            cells: [0; MAX_JOINTS],
-            bits,
-            shift: u32::from(joints <= MOST_BLOCK_JOINTS),
-        };
-        for (j, axis) in base.axes.iter().enumerate() {
+        let shift = u32::from(joints <= MOST_BLOCK_JOINTS);
+        for axis in &base.axes {
             if axis.count < 2 {
                 return Err(SpaceError::Flat { axis: axis.name.clone() });
             }
-            (space.start[j], space.step[j]) = (axis.start, axis.step);
             // Coordinates of nodes are below 2^31 and those of blocks below 2^bits.
-            let limit = 1_u64 << (bits + space.shift).min(31);
+            let limit = 1_u64 << (bits + shift).min(31);
             let fits = |levels: &u32| (axis.count as u64 - 1) < limit >> (levels - 1);
             let most = (1..=MAX_LEVELS).take_while(fits).last().unwrap_or(0);
             if levels > most {
                 return Err(SpaceError::Levels { axis: axis.name.clone(), levels, most });
             }
-            space.cells[j] = (axis.count - 1) as u32;
         }
-        Ok(space)
+        Ok(Self { base: base.clone(), levels: levels.max(1), bits, shift })
     }
 
     /// Number of joints d.
     #[must_use]
     pub fn joints(&self) -> usize {
-        self.joints
+        self.base.joints()
     }
 
     /// Number of levels, the base included.
@@ -121,7 +105,7 @@ impl Space {
     /// Spacing of `level` along `axis` (rad or m).
     #[must_use]
     pub fn step(&self, level: u32, axis: usize) -> f64 {
-        self.step[axis] / f64::from(1_u32 << level)
+        self.base.axes[axis].step / f64::from(1_u32 << level)
     }
 
     /// The block of a node of the same level.
@@ -134,13 +118,13 @@ impl Space {
     /// Place of a node in its block.
     #[inline]
     pub(super) fn place_of(&self, node: &Place) -> usize {
-        if self.shift == 0 { 0 } else { (0..self.joints).map(|a| ((node[a] & 1) as usize) << a).sum() }
+        if self.shift == 0 { 0 } else { (0..self.joints()).map(|a| ((node[a] & 1) as usize) << a).sum() }
     }
 
     /// Nodes that a block has.
     #[must_use]
     pub fn block_nodes(&self) -> usize {
-        1 << (self.joints as u32 * self.shift)
+        1 << (self.joints() as u32 * self.shift)
     }
 
     /// The level to which a node of `level` belongs, that of the coarsest grid on which it lies, and its place there.
@@ -156,16 +140,29 @@ impl Space {
     /// Last node of `level` along each axis.
     #[must_use]
     pub fn last(&self, level: u32) -> Place {
-        self.cells.map(|cells| cells << level)
+        let mut last = [0; MAX_JOINTS];
+        last.iter_mut().zip(&self.base.axes).for_each(|(last, axis)| *last = (axis.count as u32 - 1) << level);
+        last
+    }
+
+    /// The nodes of the base, last axis fastest.
+    pub fn base_nodes(&self) -> impl Iterator<Item = Place> {
+        (0..self.base.points()).map(|point| self.base.lines(point).map(|line| line as u32))
+    }
+
+    /// The first corners of the cells of the base, last axis fastest.
+    pub fn base_cells(&self) -> impl Iterator<Item = Place> {
+        let (joints, last) = (self.joints(), self.last(0));
+        self.base_nodes().filter(move |low| (0..joints).all(|a| low[a] < last[a]))
     }
 
     /// Configuration of a node (rad or m).
     #[must_use]
     pub fn configuration(&self, level: u32, node: &Place) -> crate::JointVector {
-        let mut q = crate::JointVector::zeros(self.joints);
-        for (a, q) in q.iter_mut().enumerate() {
+        let mut q = crate::JointVector::zeros(self.joints());
+        for ((q, axis), &node) in q.iter_mut().zip(&self.base.axes).zip(node) {
             // Steps of the base, which are exact: the same node has the same configuration at every level.
-            *q = self.start[a] + f64::from(node[a]) / f64::from(1_u32 << level) * self.step[a];
+            *q = axis.start + f64::from(node) / f64::from(1_u32 << level) * axis.step;
         }
         q
     }
@@ -173,32 +170,32 @@ impl Space {
     /// Key of a block.
     #[must_use]
     pub fn key(&self, level: u32, block: &Place) -> u64 {
-        block[..self.joints].iter().fold(u64::from(level), |key, &k| key << self.bits | u64::from(k))
+        block[..self.joints()].iter().fold(u64::from(level), |key, &k| key << self.bits | u64::from(k))
     }
 
     /// Returns the difference of keys between a block and its neighbour along `axis`.
     #[inline]
     pub(super) fn stride(&self, axis: usize) -> u64 {
-        1 << (self.bits * (self.joints - 1 - axis) as u32)
+        1 << (self.bits * (self.joints() - 1 - axis) as u32)
     }
 
     /// Level and block of a key; `None` if no block of this space has it.
     #[must_use]
     pub fn block(&self, key: u64) -> Option<(u32, Place)> {
         let (mut rest, mut block) = (key, [0; MAX_JOINTS]);
-        for k in block[..self.joints].iter_mut().rev() {
+        for k in block[..self.joints()].iter_mut().rev() {
             *k = u32::try_from(rest & ((1 << self.bits) - 1)).ok()?;
             rest >>= self.bits;
         }
         let level = u32::try_from(rest).ok().filter(|level| *level < self.levels)?;
         let last = self.last(level);
-        (0..self.joints).all(|a| u64::from(block[a]) << self.shift <= u64::from(last[a])).then_some((level, block))
+        (0..self.joints()).all(|a| u64::from(block[a]) << self.shift <= u64::from(last[a])).then_some((level, block))
     }
 
     /// The nodes of a block that lie in the grid and belong to its level, those of the base or not all even: place and
     /// node.
     pub fn nodes(&self, level: u32, block: &Place) -> impl Iterator<Item = (usize, Place)> + use<> {
-        let (joints, shift, last, block) = (self.joints, self.shift, self.last(level), *block);
+        let (joints, shift, last, block) = (self.joints(), self.shift, self.last(level), *block);
         (0..self.block_nodes()).filter_map(move |place| {
             let mut node = [0; MAX_JOINTS];
             for a in 0..joints {
@@ -221,12 +218,9 @@ impl Space {
     /// The cell of the base around `q`, which has one entry per joint, at the grid's border beyond it.
     pub(super) fn locate(&self, q: &[f64]) -> Cell {
         let mut cell = Cell { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
-        for (a, &q) in q.iter().enumerate().take(self.joints) {
-            let cells = f64::from(self.cells[a]);
-            // What is not a number becomes 0.
-            let steps = ((q - self.start[a]) / self.step[a]).max(0.0).min(cells);
-            let low = steps.min(cells - 1.0) as u32;
-            (cell.low[a], cell.fractions[a]) = (low, steps - f64::from(low));
+        for (a, (axis, &q)) in self.base.axes.iter().zip(q).enumerate() {
+            let (low, fraction) = axis.cell(q);
+            (cell.low[a], cell.fractions[a]) = (low as u32, fraction);
         }
         cell
     }
@@ -234,8 +228,8 @@ impl Space {
     /// The cell of the base around a node of `level`.
     pub(super) fn around(&self, level: u32, node: &Place) -> Cell {
         let mut cell = Cell { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
-        for (a, i) in node.iter().enumerate().take(self.joints) {
-            cell.low[a] = (i >> level).min(self.cells[a] - 1);
+        for (a, (axis, i)) in self.base.axes.iter().zip(node).enumerate() {
+            cell.low[a] = (i >> level).min(axis.count as u32 - 2);
             cell.fractions[a] = f64::from(i - (cell.low[a] << level)) / f64::from(1_u32 << level);
         }
         cell

@@ -7,7 +7,7 @@
 //! A store of nodes at several levels keeps no forces. Over it the forces of the equilibrium solved at the proxy, times
 //! the same factor, take their place ([`crate::render::live`]).
 
-use crate::{contact::NodeForce, dataset::Dataset, field::stencil::LatticeError, render::force_rows::ForceRows};
+use crate::{contact::NodeForce, dataset::Dataset, render::force_rows::ForceRows};
 use glam::DVec3;
 
 /// Least force that counts as a contact when friction or damping acts on it (N): far below what is felt, and large
@@ -42,12 +42,9 @@ impl Touch {
 impl Contacts {
     /// The contacts of `dataset` with a proxy of `nodes` nodes; `None` where the dataset does not hold them, or holds
     /// those of another proxy.
-    ///
-    /// # Errors
-    /// When its grid is none.
-    pub fn new(dataset: &Dataset, nodes: usize) -> Result<Option<Self>, LatticeError> {
-        let Some(touches) = &dataset.touches else { return Ok(None) };
-        Ok(ForceRows::new(&dataset.grid, touches, nodes)?.map(|rows| Self::Stored(Box::new(rows))))
+    pub fn new(dataset: &Dataset, nodes: usize) -> Option<Self> {
+        let rows = ForceRows::new(&dataset.grid, dataset.touches.as_ref()?, nodes)?;
+        Some(Self::Stored(Box::new(rows)))
     }
 
     /// Writes what touches each proxy node at `q` to `touches`, one entry per node, forces times `share`. `solved` are

@@ -18,8 +18,7 @@
 
 use super::{Bristle, EffectState, Patch, Pending, add};
 use crate::{
-    MAX_JOINTS,
-    proxy::JointMatrix,
+    JointMatrix, MAX_JOINTS,
     render::{
         accounts::Extra,
         npmi::{Load, Motion, Step},

@@ -14,11 +14,10 @@ use super::{
     npmi::{Load, MidpointInertia, Motion, Npmi, Step},
 };
 use crate::{
-    JointVector, MAX_JOINTS,
+    JointMatrix, JointVector, MAX_JOINTS,
     contact::NodeForce,
     dataset::Dataset,
-    field::stencil::LatticeError,
-    proxy::{Chain, JointMatrix},
+    proxy::Chain,
     scene::{Diagnostic, HapticsSpec},
 };
 use contacts::Touch;
@@ -96,9 +95,6 @@ pub enum EffectError {
     /// The dataset lacks what it needs.
     #[error(transparent)]
     Cannot(#[from] Diagnostic),
-    /// The dataset's grid is none.
-    #[error(transparent)]
-    Grid(#[from] LatticeError),
 }
 
 impl ContactEffects {
@@ -115,8 +111,7 @@ impl ContactEffects {
         path: &Path,
     ) -> Result<Option<Self>, EffectError> {
         let Some(name) = spec.at_contacts() else { return Ok(None) };
-        let stored = || Contacts::new(dataset, chain.nodes.len());
-        let contacts = if explored { Some(Contacts::Solved) } else { stored()? };
+        let contacts = if explored { Some(Contacts::Solved) } else { Contacts::new(dataset, chain.nodes.len()) };
         let contacts = contacts.ok_or_else(|| {
             let remedy = if dataset.refinement.is_some() {
                 "play or view the scene with --on-demand FILE, which solves them while they are felt, or bake its grid \

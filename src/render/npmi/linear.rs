@@ -1,9 +1,6 @@
 //! Small dense linear algebra over the joints: solves with held joints, and the gyroscopic matrix.
 
-use crate::{
-    JointVector, MAX_JOINTS,
-    proxy::{Dynamics, JointMatrix},
-};
+use crate::{JointMatrix, JointVector, MAX_JOINTS, proxy::Dynamics};
 
 /// Solves `(A v)_free = r_free` with `v_held` as in `at`; A positive definite, symmetric or not. Elimination without
 /// pivoting: the pivots of a positive definite matrix are positive, and so are those of its rows and columns that are

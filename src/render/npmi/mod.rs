@@ -32,9 +32,10 @@ mod stops;
 mod tests;
 
 use crate::{
-    JointVector, MAX_JOINTS,
+    JointMatrix, JointVector, MAX_JOINTS,
     field::range::Stops,
-    proxy::{Chain, JointMatrix, cholesky, solve_transposed},
+    joint_matrix::{cholesky, solve_transposed},
+    proxy::Chain,
 };
 use linear::solve_held;
 use stops::{Side, solve_in_box};

@@ -6,7 +6,7 @@
 //! for each stop that is reached.
 
 use super::linear::solve_held;
-use crate::{JointVector, MAX_JOINTS, proxy::JointMatrix};
+use crate::{JointMatrix, JointVector, MAX_JOINTS};
 
 /// Pull of a joint stop, relative to the terms that balance it, that is taken for rounding (1): the balance is a sum of
 /// eight terms of a solution whose residual is a few times the order of the matrix, six, in machine precision.

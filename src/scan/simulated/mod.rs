@@ -8,7 +8,6 @@
 //! drives it. Positions are read in whole encoder counts.
 
 mod hand;
-mod noise;
 mod sponge;
 
 pub use hand::Hand;
@@ -17,11 +16,12 @@ pub use sponge::{NodeContact, Sponge};
 use super::rig::{Rig, RigError, RigReading};
 use crate::{
     JointVector,
-    proxy::{Chain, Pose, solve_positive},
+    joint_matrix::solve_positive,
+    proxy::{Chain, Pose},
+    random::Random,
     scene::{Cover, JointKind, ProxySpec, SpecimenSpec},
 };
 use glam::DVec3;
-use noise::Noise;
 
 /// Steps of the simulation within one control period.
 const STEPS: usize = 4;
@@ -40,7 +40,7 @@ pub struct SimulatedRig {
     position: JointVector,
     velocity: JointVector,
     time: f64,
-    noise: Noise,
+    noise: Random,
     hand: Option<Hand>,
 }
 
@@ -58,7 +58,7 @@ impl SimulatedRig {
             velocity: JointVector::zeros(position.len()),
             position,
             time: 0.0,
-            noise: Noise::new(seed),
+            noise: Random::new(seed),
             hand: None,
             chain,
         };

@@ -138,7 +138,7 @@ pub(super) fn loops(
                         let line = &own.grid.axes[axis];
                         let half = 0.5 * side * line.step;
                         // The whole square moves into the grid, where the field is not faded.
-                        let (first, last) = (line.coordinate(0) + half, line.coordinate(line.count - 1) - half);
+                        let (first, last) = (line.coordinate(0) + half, line.last() - half);
                         q[axis] = q[axis].min(last).max(first) + sign * half;
                     }
                     q

@@ -44,14 +44,13 @@ impl Solution {
     #[must_use]
     pub fn none(joints: usize) -> Self {
         let zeros = JointVector::zeros(joints);
-        let tangent = JointMatrix::zeros(joints);
+        let tangent = JointMatrix::default();
         let status = Status::Outside;
         let (energy, on_proxy) = (0.0, Vec::new());
         Self { number: 0, tick: 0, place: zeros, status, torque: zeros, energy, tangent, contact_nodes: 0, on_proxy }
     }
 
     fn new(number: u64, at: &Whereabouts, equilibrium: &Equilibrium, with_forces: bool) -> Self {
-        let joints = at.position.len();
         Self {
             number,
             tick: at.tick,
@@ -59,7 +58,7 @@ impl Solution {
             status: equilibrium.status,
             torque: equilibrium.torque,
             energy: equilibrium.energy,
-            tangent: equilibrium.tangent.unwrap_or_else(|| JointMatrix::zeros(joints)),
+            tangent: equilibrium.tangent.unwrap_or_default(),
             contact_nodes: equilibrium.forces.len() as u32,
             on_proxy: if with_forces { equilibrium.on_proxy() } else { Vec::new() },
         }
@@ -76,7 +75,7 @@ impl Solution {
         let mut torque = self.torque;
         let (mut first, mut second) = (0.0, 0.0);
         for a in 0..q.len() {
-            let rise: f64 = (0..q.len()).map(|b| self.tangent.at(a, b) * (q[b] - self.place[b])).sum();
+            let rise: f64 = (0..q.len()).map(|b| self.tangent[a][b] * (q[b] - self.place[b])).sum();
             first -= self.torque[a] * (q[a] - self.place[a]);
             second -= 0.5 * rise * (q[a] - self.place[a]);
             torque[a] += rise;

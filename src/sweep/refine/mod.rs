@@ -32,11 +32,11 @@ use super::{
     reference::{REFERENCE_TOLERANCE, tight},
 };
 use crate::{
-    JointVector, MAX_JOINTS,
+    JointVector,
     contact::{Backend, Model, Solvers, Status},
     dataset::Grid,
     scene::{JointKind, LEVER_ARM},
-    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store, record::width},
+    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store, beyond, record::width},
 };
 use nodebook::{HeldNodes, Nodebook, held_bytes};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -159,11 +159,10 @@ impl Refine<'_> {
         let scale = Scale::new(self.model, &space);
         let solvers = Solvers::new(self.model, rayon::current_num_threads());
         let mut book = Nodebook::new((space.clone(), scale), (backend, self.batch), solvers, lowest);
-        let base = lattice(&space, |last| last);
-        book.solve(0, base.iter().copied())?;
+        book.solve(0, space.base_nodes())?;
         let mut nodes = vec![BTreeSet::new(); self.levels as usize];
-        nodes[0] = base.into_iter().collect();
-        let leaves = lattice(&space, |last| last - 1).into_iter().map(|low| Leaf { level: 0, low, square: 0.0 });
+        nodes[0] = space.base_nodes().collect();
+        let leaves = space.base_cells().map(|low| Leaf { level: 0, low, square: 0.0 });
         Ok(Filling { book, levers, nodes, leaves: leaves.collect(), squares: HashMap::new() })
     }
 }
@@ -215,7 +214,7 @@ impl<B: Backend> Filling<'_, B> {
     /// Rms of the torque at the corners of a cell of the base (N m).
     fn torque(&self, low: &Place) -> f64 {
         let corners = 1_usize << self.book.nodes.space.joints();
-        let solved = (0..corners).filter_map(|set| self.book.nodes.get(0, &corner(low, set)));
+        let solved = (0..corners).filter_map(|set| self.book.nodes.get(0, &beyond(low, set)));
         let squares = solved.map(|held| {
             let parts = held.node.result.torque.iter().zip(self.levers.iter());
             parts.map(|(tau, lever)| (lever * tau).powi(2)).sum::<f64>()
@@ -257,7 +256,7 @@ impl<B: Backend> Filling<'_, B> {
     fn expect(&mut self, store: &Store) -> Result<(), RefineError> {
         let space = self.book.nodes.space.clone();
         let joints = space.joints();
-        let cells = lattice(&space, |last| last - 1);
+        let cells: Vec<Place> = space.base_cells().collect();
         let middles = cells.iter().map(|low| odd(&space, low)).collect();
         self.compare(store, 1, &middles)?;
         let torque: f64 = cells.iter().map(|low| self.torque(low).powi(2)).sum();
@@ -266,7 +265,7 @@ impl<B: Backend> Filling<'_, B> {
             let before = if *level == 0 {
                 share * self.torque(low).powi(2)
             } else {
-                let (sum, count) = self.known(*level, (0..1 << joints).map(|set| corner(low, set)));
+                let (sum, count) = self.known(*level, (0..1 << joints).map(|set| beyond(low, set)));
                 FALL * sum / count.max(1.0)
             };
             let (sum, count) = self.known(level + 1, inside(&space, low));
@@ -316,33 +315,12 @@ impl<B: Backend> Filling<'_, B> {
             self.nodes[level as usize + 1].extend(nodes);
             let lows = cells().flat_map(|leaf| {
                 let first = leaf.low.map(|i| 2 * i);
-                (0..1 << space.joints()).map(move |half| corner(&first, half))
+                (0..1 << space.joints()).map(move |half| beyond(&first, half))
             });
             self.leaves.extend(lows.map(|low| Leaf { level: level + 1, low, square: 0.0 }));
         }
         Ok(())
     }
-}
-
-/// All places up to the one that `last` makes of the last node of the base, along each axis.
-fn lattice(space: &Space, last: impl Fn(u32) -> u32) -> Vec<Place> {
-    let mut places = vec![[0; MAX_JOINTS]];
-    for a in 0..space.joints() {
-        let grown = places.iter().flat_map(|place| {
-            (0..=last(space.last(0)[a])).map(move |k| {
-                let mut place = *place;
-                place[a] = k;
-                place
-            })
-        });
-        places = grown.collect();
-    }
-    places
-}
-
-/// The corner of a cell on the far side along the axes in `set`.
-fn corner(low: &Place, set: usize) -> Place {
-    std::array::from_fn(|a| low[a] + (set >> a & 1) as u32)
 }
 
 /// The node in the middle of a cell, of the next level.

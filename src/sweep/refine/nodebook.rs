@@ -11,7 +11,7 @@ use super::RefineError;
 use crate::{
     JointVector,
     contact::{Backend, CHUNKS_IN_FLIGHT, Equilibrium, NodeForce, Solver, Solvers, Status},
-    store::{Place, Space},
+    store::{Place, Space, beyond},
     sweep::{
         lowest::{Lattice, Lowered, settle},
         node::{Scale, Solved, holding, solve_all},
@@ -76,7 +76,7 @@ impl HeldNodes {
     pub fn around(&self, q: &JointVector) -> Option<(Vec<Point>, JointVector)> {
         (0..self.space.levels()).rev().find_map(|level| {
             let low = self.space.cell(level, q);
-            let corners = (0..1 << self.space.joints()).map(|set| self.space.owner(level, super::corner(&low, set)));
+            let corners = (0..1 << self.space.joints()).map(|set| self.space.owner(level, beyond(&low, set)));
             let solved: Option<Vec<Point>> =
                 corners.map(|point| self.held.contains_key(&point).then_some(point)).collect();
             Some((solved?, self.spacing(level)))
