@@ -3,7 +3,7 @@
 //! Unknown keys are refused with the list of the known ones. Nothing is checked here beyond types; see
 //! [`super::convert`].
 
-use super::{Algorithm, ContactSurface, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
+use super::{ContactSurface, Cover, Interpolation, JointKind, ProxyInertia, SpringKind};
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
 use toml::Spanned;
@@ -199,7 +199,7 @@ pub(super) struct NodesTable {
 pub(super) struct ContactTable {
     pub stiffness: Option<Spanned<NumberOr<Rigid>>>,
     pub stiffness_per_length: Option<Number>,
-    pub algorithm: Option<Algorithm>,
+    pub algorithm: Option<Spanned<String>>,
     pub tolerance: Option<Number>,
     pub max_iterations: Option<Spanned<u32>>,
     pub updates: Option<Spanned<u32>>,

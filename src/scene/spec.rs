@@ -282,8 +282,6 @@ pub struct ContactSpec {
     pub tolerance: f64,
     /// After as many a configuration that has not converged is flagged.
     pub max_iterations: u32,
-    /// How often linearised contact updates its geometry, at the displacement found.
-    pub updates: u32,
     /// Which surface the proxy feels.
     pub surface: ContactSurface,
 }
@@ -325,15 +323,15 @@ impl ContactSpec {
 }
 
 /// How equation (2) is solved for one configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Algorithm {
     /// Minimum of the stored energy; geometry follows the deformation.
     Energy,
     /// The paper's four-step iteration (section 2.1).
     Paper,
-    /// Minimum of the stored energy with the geometry frozen, at rest or at the last of its updates.
-    Linearised,
+    /// Minimum of the stored energy with depths and directions before the surface at rest: a convex problem, with one
+    /// solution.
+    Rest,
 }
 
 impl Algorithm {
@@ -343,7 +341,7 @@ impl Algorithm {
         match self {
             Self::Energy => "energy",
             Self::Paper => "paper",
-            Self::Linearised => "linearised",
+            Self::Rest => "rest",
         }
     }
 }

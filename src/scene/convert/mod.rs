@@ -78,7 +78,9 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     };
     // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
     // energy.
-    let solved = table.contact.as_ref().is_some_and(|own| own.get_ref().algorithm != Some(Algorithm::Paper));
+    let is_paper =
+        |own: &ContactTable| own.algorithm.as_ref().is_some_and(|named| named.get_ref() == Algorithm::Paper.name());
+    let solved = table.contact.as_ref().is_some_and(|own| !is_paper(own.get_ref()));
     let interpolation = if object.is_some() && solved { Interpolation::Potential } else { Interpolation::Linear };
     if let Some(name) = &table.name {
         names::check(name.get_ref()).map_err(|why| checker.error(name.span(), why))?;
@@ -98,26 +100,30 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &SceneTable) -> Result<Ren
     })
 }
 
-/// Most updates of linearised contact (1): far more than where it settles, and still milliseconds for a configuration.
-const MAX_UPDATES: u32 = 1000;
-
-fn updates(checker: &Checker<'_>, table: &ContactTable) -> Result<u32, SceneError> {
-    let Some(value) = &table.updates else { return Ok(0) };
-    if table.algorithm != Some(Algorithm::Linearised) {
-        let reason = "updates acts on linearised contact, whose geometry is frozen: \
-                      add algorithm = \"linearised\", or leave it out";
-        return Err(checker.error(value.span(), reason));
+/// How contact is solved, which a scene may leave to the default.
+fn algorithm(checker: &Checker<'_>, table: &ContactTable) -> Result<Algorithm, SceneError> {
+    if let Some(value) = &table.updates {
+        return Err(checker
+            .error(value.span(), "updates acted on the algorithm \"linearised\", which is no more: leave it out"));
     }
-    if *value.get_ref() > MAX_UPDATES {
-        let reason = format!(
-            "updates is {}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm \
-             = \"energy\"",
-            value.get_ref()
-        );
-        return Err(checker.error(value.span(), reason));
-    }
-    Ok(*value.get_ref())
+    let Some(value) = &table.algorithm else { return Ok(Algorithm::Energy) };
+    let name = value.get_ref();
+    let known = <Algorithm as clap::ValueEnum>::value_variants();
+    known.iter().copied().find(|known| known.name() == name).ok_or_else(|| {
+        let names: Vec<String> = known.iter().map(|known| format!("`{}`", known.name())).collect();
+        let reason = if name == LINEARISED {
+            format!(
+                "the algorithm {LINEARISED:?} is no more, its torque was not the gradient of its energy: take \"rest\""
+            )
+        } else {
+            format!("unknown algorithm {name:?}: take one of {}", names.join(", "))
+        };
+        checker.error(value.span(), reason)
+    })
 }
+
+/// What [`Algorithm::Rest`] took the place of; datasets of it are still read.
+const LINEARISED: &str = "linearised";
 
 /// Kc of a node (N/m), that of the mean node where the scene gives the stiffness of links per length, and that (N/m^2).
 fn stiffness(
@@ -169,7 +175,7 @@ fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySp
         Some(value) => *value.get_ref(),
         None => CONTACT_ITERATIONS,
     };
-    let algorithm = table.algorithm.unwrap_or(Algorithm::Energy);
+    let algorithm = algorithm(checker, table)?;
     if let Some(value) = &table.surface
         && *value.get_ref() == ContactSurface::Smooth
         && algorithm == Algorithm::Paper
@@ -194,7 +200,6 @@ fn contact(checker: &Checker<'_>, table: &Spanned<ContactTable>, proxy: &ProxySp
         algorithm,
         tolerance: tolerance.unwrap_or(Ok(CONTACT_TOLERANCE))?,
         max_iterations,
-        updates: updates(checker, table)?,
         surface: table.surface.as_ref().map_or(default, |value| *value.get_ref()),
     })
 }
