@@ -183,7 +183,7 @@ impl RestProgram {
             .iter()
             .zip(&program.slack)
             .map(|(force, slack)| if *force > 0.0 { slack.abs() } else { slack.max(0.0) });
-        off.fold(0.0, f64::max) / deepest
+        off.fold(0.0, f64::max) / deepest.max(f64::MIN_POSITIVE)
     }
 }
 
