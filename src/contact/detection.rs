@@ -203,8 +203,8 @@ impl Detection {
         contact_with(model, i, self.nodes[i], &closest, facet, pseudonormal)
     }
 
-    /// The row of proxy node `i` before the surface at rest, with its depth there (negative outside), if that is at least
-    /// `-reach` (m).
+    /// The row of proxy node `i` before the surface at rest, with its depth there (negative outside), if that is at
+    /// least `-reach` (m).
     pub fn at_rest(&mut self, model: &Model, i: usize, reach: f64) -> Option<Contact> {
         let (x, radius) = (self.nodes[i], model.chain.nodes[i].radius);
         let known = &mut self.at_rest[i];

@@ -77,9 +77,9 @@ pub struct Equilibrium {
     pub status: Status,
     /// Steps tried (`energy`), passes (`paper`), or systems solved (`rest`).
     pub iterations: u32,
-    /// Relative residual of the force balance, in the energy norm; with `rest` the greatest depth that the forces do not
-    /// account for, over the greatest at rest; one where nothing could be computed (1). In contact
-    /// so stiff that forces follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
+    /// Relative residual of the force balance, in the energy norm; with `rest` the greatest depth that the forces do
+    /// not account for, over the greatest at rest; one where nothing could be computed (1). In contact so stiff that
+    /// forces follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
     pub residual: f64,
     /// Stored energy U: elastic and contact springs (J).
     pub energy: f64,

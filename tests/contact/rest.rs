@@ -1,5 +1,5 @@
-//! Contact with the surface at rest: the torque is the gradient of the energy, on every kind of body, at every stiffness
-//! and depth.
+//! Contact with the surface at rest: the torque is the gradient of the energy, on every kind of body, at every
+//! stiffness and depth.
 
 use crate::fixture::{arm, random_configurations, sphere, torus};
 use haptize::contact::{Equilibrium, Model, Solver, Status};

@@ -1,17 +1,17 @@
 //! Contact with the surface at rest, in exact form: Signorini's problem.
 //!
 //! Depth D_i and row g_i of proxy node i, which says how the object's nodes carry and deepen it, belong to the place of
-//! the node before the undeformed surface, and the depth is linear in the displacement: D_i + g_i . u. The stored energy
-//! is then convex, and by duality
+//! the node before the undeformed surface, and the depth is linear in the displacement: D_i + g_i . u. The stored
+//! energy is then convex, and by duality
 //!
 //! `U(q) = max over lambda >= 0 of lambda . D - 1/2 lambda . (G C G^T + 1/kc) lambda`,
 //!
-//! with one solution, the forces of the contacts, and u = -C G^T lambda. By the envelope theorem
-//! `tau = -dU/dq = -sum_i lambda_i J_i^T (grad D_i + grad g_i . u)`: the proxy is pushed along the normal, and sideways by
-//! how its row changes along the surface. That part has no counterpart among the forces on the object's nodes, which
-//! are -lambda_i g_i. The gradient of a row is the mixed second derivative of the depth, as [`super::super::law::depth`]
-//! has it; where that limits a curvature (next to an edge, a vertex, or the points where the closest point leaps) the
-//! torque is off by what the limit leaves out.
+//! with one solution, the forces of the contacts, and u = -C G^T lambda. By the envelope theorem `tau = -dU/dq = -sum_i
+//! lambda_i J_i^T (grad D_i + grad g_i . u)`: the proxy is pushed along the normal, and sideways by how its row changes
+//! along the surface. That part has no counterpart among the forces on the object's nodes, which are -lambda_i g_i. The
+//! gradient of a row is the mixed second derivative of the depth, as [`super::super::law::depth`] has it; where that
+//! limits a curvature (next to an edge, a vertex, or the points where the closest point leaps) the torque is off by
+//! what the limit leaves out.
 //!
 //! Only nodes that touch somewhere have a row: first those below the surface at rest, and, after the program is solved,
 //! those that the surface has bulged up to, until there are no more.

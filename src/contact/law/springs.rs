@@ -45,9 +45,9 @@ impl<'a> Springs<'a> {
         row.normal.dot(row.moved(|j| DVec3::from_array(nodes[slots[j] as usize])))
     }
 
-    /// Sets `column` to the displacement of the support under a force of one newton along row `k`, C g_k, and `deepened` to
-    /// by how much that deepens each of the rows `others`. `scalars` is room for the column along the row's normal
-    /// (m/N).
+    /// Sets `column` to the displacement of the support under a force of one newton along row `k`, C g_k, and
+    /// `deepened` to by how much that deepens each of the rows `others`. `scalars` is room for the column along the
+    /// row's normal (m/N).
     pub fn respond(
         self,
         support: &Support,
