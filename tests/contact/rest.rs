@@ -165,47 +165,6 @@ fn every_configuration_has_its_equilibrium_within_few_steps() {
     }
 }
 
-/// Work of the torque around squares of three degrees, by Simpson's rule, relative to the greatest energy on the way.
-#[test]
-fn no_closed_loop_makes_work() {
-    const PARTS: usize = 200;
-    let (object, chain) = (sphere(SpringKind::Isotropic), Chain::new(&arm(0.0)));
-    let model = Model::new(&object, &chain, contact(1e4));
-    let mut solver = Solver::new(&model);
-    let side = 3_f64.to_radians();
-    let mut loops = 0;
-    for q in random_configurations(7, 60) {
-        let (mut work, mut greatest, mut deepest) = (0.0, 0.0_f64, 0.0_f64);
-        for (start, along) in
-            [([0.0, 0.0], [1.0, 0.0]), ([1.0, 0.0], [0.0, 1.0]), ([1.0, 1.0], [-1.0, 0.0]), ([0.0, 1.0], [0.0, -1.0])]
-        {
-            for k in 0..=2 * PARTS {
-                let way = k as f64 / (2 * PARTS) as f64;
-                let mut at = q.clone();
-                (0..2).for_each(|joint| at[joint + 1] += side * (start[joint] + way * along[joint]));
-                let here = solver.solve(&at);
-                let weight = if k == 0 || k == 2 * PARTS {
-                    1.0
-                } else if k % 2 == 1 {
-                    4.0
-                } else {
-                    2.0
-                };
-                let along: f64 = (0..2).map(|joint| along[joint] * here.torque[joint + 1]).sum();
-                work += weight * along * side / (6 * PARTS) as f64;
-                (greatest, deepest) = (greatest.max(here.energy), deepest.max(-here.gap));
-            }
-        }
-        // In the middle of the object directions turn from side to side at once.
-        if greatest == 0.0 || deepest > 0.02 {
-            continue;
-        }
-        loops += 1;
-        assert!(work.abs() <= 1e-4 * greatest, "{q:?}: {work} of {greatest}");
-    }
-    assert!(loops > 3, "{loops}");
-}
-
 /// At the depths of the shipped scenes both laws agree, the better the shallower: of the torque, rms over rms.
 #[test]
 fn contact_at_rest_agrees_with_the_energy_form_at_ordinary_depths() {
