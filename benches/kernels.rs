@@ -111,7 +111,7 @@ fn kernels(context: &Arc<Context>, scene: &Scene) -> Result<(), Box<dyn Error>> 
     println!("copies {:.1} GB/s, as many bytes read as written", 1e-9 * copying);
     let adapter = Adapter { copying, hardware };
     let swept = refined(scene, if hardware { SWEPT } else { 1 });
-    for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Linearised] {
+    for algorithm in [Algorithm::Energy, Algorithm::Paper] {
         sweep(context, &swept, algorithm, adapter)?;
     }
     count(context, if hardware { 1 } else { HOST_STRIDE }, adapter)?;

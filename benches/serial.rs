@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "{:<24} {:>10} {:>12} {:>20} {:>18}",
         "", "shared out", "beside that", "alone or awaited", "and behind that"
     );
-    for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Linearised] {
+    for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Rest] {
         scene.contact.algorithm = algorithm;
         for work in [Extent::Solved, Extent::Lowest, Extent::Measured] {
             let mut least = bake(&scene, work)?;

@@ -11,8 +11,6 @@ override WORKGROUP: u32 = 32u;
 // Whether there is a trial that waits for this.
 var<workgroup> waits: u32;
 
-var<workgroup> shares: array<real, WORKGROUP>;
-
 // Words of a bit for each node that the compliance covers: which are needed, and which are displaced by this trial.
 override NODE_WORDS: u32 = 1u;
 var<workgroup> needed: array<atomic<u32>, NODE_WORDS>;
@@ -20,24 +18,6 @@ var<workgroup> ready: array<u32, NODE_WORDS>;
 
 // Nodes that this invocation has displaced.
 var<private> displaced: u32;
-
-// Farther from the surface at rest than this no proxy node can touch where geometry is frozen: 1/2 |u|^2 <= E <= E(0)
-// in the energy norm, and |u_j|^2 <= trace(C_jj) |u|^2, all along the search.
-fn frozen_reach(local: u32) -> real {
-    var own = real(0.0);
-    for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
-        let depth = max(proxy_radius(node) - rest_distance(node) + parameters.gap_band, real(0.0));
-        own += proxy_share(node) * depth * depth;
-    }
-    shares[local] = own;
-    workgroupBarrier();
-    var sum = real(0.0);
-    for (var k = 0u; k < WORKGROUP; k += 1u) {
-        sum += shares[k];
-    }
-    workgroupBarrier();
-    return sqrt(parameters.kc * parameters.softest * sum);
-}
 
 // Lists the proxy nodes whose gap at rest is no wider than `reach`, in ascending order; returns how many there are.
 fn list_candidates(reach: real, local: u32) -> u32 {
@@ -66,7 +46,7 @@ fn matters_within(node: u32) -> real {
     let farthest = farthest_at_rest(node) + moved;
     // A node that was outside at rest is inside only where the surface has passed over it, and then no deeper than
     // that.
-    let is_followed = FROZEN || rest <= band || word(at_watched(node)) != 0u;
+    let is_followed = rest <= band || word(at_watched(node)) != 0u;
     return select(min(farthest, max(proxy_radius(node), moved - rest + band)), farthest, is_followed);
 }
 
@@ -136,9 +116,8 @@ fn displace(count: u32, local: u32) {
     sync();
 }
 
-// Writes the rows of `candidates` proxy nodes: of those that touch or have touched or, where geometry is frozen, have a
-// gap no wider than `reach`.
-fn write_rows(candidates: u32, reach: real, local: u32) {
+// Writes the rows of `candidates` proxy nodes: of those that touch or have touched.
+fn write_rows(candidates: u32, local: u32) {
     let half = 1u - word(HALF);
     var rows = 0u;
     begin_displacing(local);
@@ -167,7 +146,7 @@ fn write_rows(candidates: u32, reach: real, local: u32) {
             jet = jet_at(closest.point.weights);
             let is_inside = dot(jet.point, outward) >= 0.0;
             let depth = proxy_radius(node) + select(-closest.distance, closest.distance, is_inside);
-            is_row = depth > 0.0 || word(at_watched(node)) != 0u || (FROZEN && depth >= -reach);
+            is_row = depth > 0.0 || word(at_watched(node)) != 0u;
             if depth > 0.0 {
                 set_word(at_watched(node), 1u);
             }
@@ -220,12 +199,8 @@ fn main(
     }
     workgroupBarrier();
     if waits != 0u {
-        var reach = scalar(MOVED);
-        if FROZEN {
-            reach = frozen_reach(local);
-        }
-        let candidates = list_candidates(reach, local);
-        write_rows(candidates, reach, local);
+        let candidates = list_candidates(scalar(MOVED), local);
+        write_rows(candidates, local);
         account(candidates, local);
     }
 }

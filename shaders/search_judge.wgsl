@@ -20,8 +20,7 @@ fn judge(local: u32) {
         } else if kind == NUDGED {
             multiplier = kc * force;
         }
-        // Frozen geometry has no curvature.
-        set_scalar(at + MULTIPLIER, select(multiplier, real(0.0), FROZEN));
+        set_scalar(at + MULTIPLIER, multiplier);
     }
     if kind != AT_REST {
         for (var row = local; row < row_count; row += WORKGROUP) {
@@ -259,8 +258,7 @@ fn decide() -> u32 {
     let may_go_on = word(ITERATIONS) < parameters.max_iterations;
     if kc == parameters.kc && residual <= parameters.tolerance {
         set_word(NUDGES, 0u);
-        // A convex problem has no saddle.
-        return select(converged(), PROBE, may_go_on && !FROZEN);
+        return select(converged(), PROBE, may_go_on);
     }
     if !may_go_on || !(length >= GIVE_UP_LENGTH * greatest) {
         return given_up();

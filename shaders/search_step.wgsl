@@ -301,32 +301,7 @@ fn place(local: u32) {
         set_scalar(TRIAL_ELASTIC, elastic);
         set_scalar(MOVED, parameters.mobility * norm + bulging);
         set_scalar(BULGE, parameters.bulge + bulging);
-        go_to(select(PLACED, JUDGE, FROZEN));
-    }
-    if FROZEN {
-        sync();
-        deepen_rows(local);
-    }
-}
-
-// The trial's rows where their geometry is frozen: those of the state, deepened by the displacement LEFT_PRODUCT.
-fn deepen_rows(local: u32) {
-    let trial = 1u - own;
-    for (var row = local; row < row_count; row += WORKGROUP) {
-        let source = numbers(row);
-        let at = at_numbers(trial, row);
-        for (var k = 0u; k < NODE_WEIGHTS + 3u * parameters.carriers; k += 1u) {
-            set_scalar(at + k, scalar(source + k));
-        }
-        let node = word(row_words(row));
-        let deepening = dot(vector_at(source + NORMAL), moved_point(row, LEFT_PRODUCT));
-        set_scalar(at + DEPTH, proxy_radius(node) + scalar(source + DISTANCE) + deepening);
-        for (var k = 0u; k < ROW_WORDS + parameters.carriers; k += 1u) {
-            set_word(at_row(trial, row) + k, word(row_words(row) + k));
-        }
-    }
-    if local == 0u {
-        set_word(ROWS + trial, row_count);
+        go_to(PLACED);
     }
 }
 

@@ -57,17 +57,12 @@ struct SearchParameters {
     least_scale: real,
     // Below this distance to an edge or vertex the direction to it is rounding [m].
     least_distance: real,
-    // Largest trace of a node's own block of C [m/N].
-    softest: real,
 }
 
 alias Parameters = SearchParameters;
 
 // Whether the compliance has one number for a pair of nodes.
 override ISOTROPIC: bool = false;
-
-// Whether contact is linearised: its geometry is frozen at rest.
-override FROZEN: bool = false;
 
 // Whether the tangent is wanted.
 override WITH_TANGENT: bool = false;

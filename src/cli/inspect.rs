@@ -155,7 +155,13 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
     let wrong = |why: String| format!("{}: the scene in the dataset: {why}", path.display());
     let mut scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(error.to_string()))?;
     dataset.check_scene().map_err(wrong)?;
-    scene.contact.algorithm = Algorithm::from_str(&dataset.provenance.algorithm, true)?;
+    let algorithm = &dataset.provenance.algorithm;
+    scene.contact.algorithm = Algorithm::from_str(algorithm, true).map_err(|_| {
+        wrong(format!(
+            "it was solved by the algorithm `{}`, which is no more: bake it anew",
+            crate::names::escaped(algorithm)
+        ))
+    })?;
     let object = surface.object(&scene.object)?;
     Ok((scene, object, Some(dataset)))
 }

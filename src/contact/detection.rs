@@ -203,29 +203,27 @@ impl Detection {
         contact_with(model, i, self.nodes[i], &closest, facet, pseudonormal)
     }
 
-    /// Rows of the problem with geometry frozen at rest: every proxy node within `reach` of the surface, with its depth
-    /// at rest (negative outside) and no curvature.
-    pub fn frozen(&mut self, model: &Model, reach: f64, rows: &mut Vec<Contact>) {
-        rows.clear();
-        for i in 0..self.nodes.len() {
-            let x = self.nodes[i];
-            let radius = model.chain.nodes[i].radius;
-            let known = &mut self.at_rest[i];
-            if !known.inside && known.distance - radius > reach {
-                continue;
-            }
-            let closest = find_at_rest(&model.surface, x, known);
-            if closest.triangle == u32::MAX {
-                continue;
-            }
-            let facet = model.surface.facet_at_rest(closest.triangle);
-            let direction = model.surface.pseudonormal_at_rest(closest.triangle, &closest.point);
-            let mut row = contact_with(model, i, x, &closest, &facet, direction);
-            if row.depth >= -reach {
-                row.freeze();
-                rows.push(row);
-            }
+    /// The row of proxy node `i` before the surface at rest, with its depth there (negative outside), if that is at
+    /// least `-reach` (m).
+    pub fn at_rest(&mut self, model: &Model, i: usize, reach: f64) -> Option<Contact> {
+        let (x, radius) = (self.nodes[i], model.chain.nodes[i].radius);
+        let known = &mut self.at_rest[i];
+        if !known.inside && known.distance - radius > reach {
+            return None;
         }
+        let mut closest = Closest::none();
+        if known.exact && (known.closest as usize) < model.surface.triangles.len() {
+            closest.consider(x, &model.surface.facet_at_rest(known.closest), known.closest, f64::MAX);
+        } else {
+            closest = find_at_rest(&model.surface, x, known);
+        }
+        if closest.triangle == u32::MAX {
+            return None;
+        }
+        let facet = model.surface.facet_at_rest(closest.triangle);
+        let direction = model.surface.pseudonormal_at_rest(closest.triangle, &closest.point);
+        let row = contact_with(model, i, x, &closest, &facet, direction);
+        (row.depth >= -reach).then_some(row)
     }
 }
 
@@ -328,7 +326,6 @@ mod tests {
                 algorithm: Algorithm::Energy,
                 tolerance: 1e-8,
                 max_iterations: 1,
-                updates: 0,
                 surface,
             };
             let model = Model::new(&object, &chain, contact);

@@ -77,10 +77,11 @@ impl Status {
 pub struct Equilibrium {
     /// How it ended.
     pub status: Status,
-    /// Steps tried (`energy`, `linearised`) or passes (`paper`).
+    /// Steps tried (`energy`), passes (`paper`), or systems solved (`rest`).
     pub iterations: u32,
-    /// Relative residual of the force balance, in the energy norm; one where nothing could be computed (1). In contact
-    /// so stiff that forces follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
+    /// Relative residual of the force balance, in the energy norm; with `rest` the greatest depth that the forces do
+    /// not account for, over the greatest at rest; one where nothing could be computed (1). In contact so stiff that
+    /// forces follow the rounding of depths it may exceed the tolerance of a converged equilibrium.
     pub residual: f64,
     /// Stored energy U: elastic and contact springs (J).
     pub energy: f64,
@@ -141,6 +142,7 @@ pub struct Touch {
     /// The object's nodes of the touched facet, and the share of the reaction that each carries, in sum one: the three
     /// corners of a flat facet, or the nodes on which a smooth one depends: its corners and all their neighbours.
     pub carriers: Vec<(u32, f64)>,
-    /// Force on the proxy node (N).
+    /// Force on the proxy node (N). With `rest` its part along the surface has no reaction: the object is pushed back
+    /// along the normal.
     pub force: DVec3,
 }

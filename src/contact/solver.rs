@@ -1,8 +1,9 @@
 //! Equilibrium of one configuration: dispatch to the scene's algorithm and the account of its result.
 
 use super::detection::Detection;
-use super::equilibrium::energy::{EnergySearch, Geometry, SolverStats, StoppingCriteria};
+use super::equilibrium::energy::{EnergySearch, SolverStats, StoppingCriteria};
 use super::equilibrium::paper::PaperIteration;
+use super::equilibrium::rest::RestProgram;
 use super::linear::support::dot;
 use super::model::Model;
 use super::reach;
@@ -21,6 +22,7 @@ pub struct Solver<'a> {
     detection: Detection,
     energy: EnergySearch,
     paper: PaperIteration,
+    rest: RestProgram,
     /// Search that holds the displacement of the last configuration.
     held_by: HeldBy,
     /// That displacement, where it was asked for (m).
@@ -37,6 +39,7 @@ enum HeldBy {
     Nothing,
     Energy,
     Paper,
+    Rest,
 }
 
 impl<'a> Solver<'a> {
@@ -50,6 +53,7 @@ impl<'a> Solver<'a> {
             detection: Detection::new(model),
             energy: EnergySearch::new(model),
             paper: PaperIteration::new(model),
+            rest: RestProgram::new(model),
             held_by: HeldBy::Nothing,
             displacement: None,
             node_forces: vec![DVec3::ZERO; surface_nodes],
@@ -65,9 +69,9 @@ impl<'a> Solver<'a> {
     #[must_use]
     pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
         self.find(q, |solver, equilibrium| match solver.model.contact.algorithm {
-            Algorithm::Energy => solver.minimise(Geometry::Deformed, None, equilibrium),
-            Algorithm::Linearised => solver.minimise(Geometry::Frozen, None, equilibrium),
+            Algorithm::Energy => solver.minimise(None, equilibrium),
             Algorithm::Paper => solver.iterate(equilibrium),
+            Algorithm::Rest => solver.maximise(equilibrium),
         })
     }
 
@@ -81,17 +85,16 @@ impl<'a> Solver<'a> {
         kc: f64,
         limits: StoppingCriteria,
     ) -> Equilibrium {
-        let geometry = match self.model.contact.algorithm {
-            Algorithm::Linearised => Geometry::Frozen,
-            Algorithm::Energy | Algorithm::Paper => Geometry::Deformed,
-        };
-        self.find(q, |solver, equilibrium| solver.minimise(geometry, Some(((forces, kc), limits)), equilibrium))
+        self.find(q, |solver, equilibrium| solver.minimise(Some(((forces, kc), limits)), equilibrium))
     }
 
     /// The same by the energy form, from where `forces` on the object's nodes hold it, with the scene's tolerance and
-    /// iterations.
+    /// iterations. With the surface at rest there is one equilibrium, and no search that could start there.
     #[must_use]
     pub fn solve_from(&mut self, q: &[f64], forces: &[NodeForce]) -> Equilibrium {
+        if self.model.contact.algorithm == Algorithm::Rest {
+            return self.solve(q);
+        }
         let limits =
             StoppingCriteria { tolerance: self.model.contact.tolerance, iterations: self.model.contact.max_iterations };
         self.solve_with_guess(q, forces, self.model.kc, limits)
@@ -148,18 +151,18 @@ impl<'a> Solver<'a> {
     /// Whether the compliance covers all that `equilibrium` depends on.
     fn is_covered(&mut self, equilibrium: &Equilibrium) -> bool {
         let model = self.model;
+        let elastic = match self.held_by {
+            HeldBy::Energy => Some(self.energy.state.elastic),
+            HeldBy::Rest => Some(self.rest.elastic),
+            HeldBy::Nothing | HeldBy::Paper => None,
+        };
+        let within = |solver: &Self, moved: f64| reach::covers(model, &solver.detection, equilibrium, moved);
         model.compliance.is_whole()
-            || (self.held_by == HeldBy::Energy
-                && reach::covers(
-                    model,
-                    &self.detection,
-                    equilibrium,
-                    model.motion_bound(self.energy.state.elastic).moved,
-                ))
+            || elastic.is_some_and(|elastic| within(self, model.motion_bound(elastic).moved))
             || {
                 let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length());
                 let moved = moved.fold(0.0, f64::max);
-                reach::covers(model, &self.detection, equilibrium, moved)
+                within(self, moved)
             }
     }
 
@@ -182,7 +185,7 @@ impl<'a> Solver<'a> {
     /// Displacement u of the surface nodes at the last configuration solved, three numbers a node (m).
     #[must_use]
     pub fn displacement(&mut self) -> &[f64] {
-        let Self { model, energy, paper, held_by, displacement, .. } = self;
+        let Self { model, energy, paper, rest, held_by, displacement, .. } = self;
         displacement.get_or_insert_with(|| {
             let mut displacement = vec![0.0; 3 * model.surface.positions.len()];
             match held_by {
@@ -191,6 +194,7 @@ impl<'a> Solver<'a> {
                     energy.support.displace(&model.compliance, &energy.state.forces, &mut displacement);
                 }
                 HeldBy::Paper => displacement.copy_from_slice(&paper.displacement),
+                HeldBy::Rest => rest.support.displace(&model.compliance, &rest.forces, &mut displacement),
             }
             displacement
         })
@@ -212,14 +216,13 @@ impl<'a> Solver<'a> {
     /// The energy form: touches, displacement and U, from the rest state or from forces near the solution.
     fn minimise(
         &mut self,
-        geometry: Geometry,
         near: Option<((&[NodeForce], f64), StoppingCriteria)>,
         equilibrium: &mut Equilibrium,
     ) -> SolverStats {
         let Self { model, detection, energy, .. } = self;
         let outcome = match near {
-            None => energy.search(model, detection, geometry),
-            Some((forces, limits)) => energy.solve_with_guess(model, detection, geometry, forces, limits),
+            None => energy.search(model, detection),
+            Some((forces, limits)) => energy.solve_with_guess(model, detection, forces, limits),
         };
         let state = &self.energy.state;
         self.held_by = HeldBy::Energy;
@@ -230,11 +233,23 @@ impl<'a> Solver<'a> {
             force: contact.normal * (self.model.kc * contact.force_over_kc()),
         }));
         for touch in &equilibrium.touches {
-            for &(node, weight) in &touch.carriers {
-                if weight != 0.0 {
-                    push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, -touch.force * weight);
-                }
-            }
+            let Self { node_forces, marked, touched, .. } = self;
+            push_back(node_forces, marked, touched, &touch.carriers, touch.force);
+        }
+        outcome
+    }
+
+    /// Contact with the surface at rest: touches and U. The sideways part of the force on the proxy, which comes of how
+    /// rows change along the surface, does not push back on the object.
+    fn maximise(&mut self, equilibrium: &mut Equilibrium) -> SolverStats {
+        let Self { model, detection, rest, node_forces, marked, touched, .. } = self;
+        let outcome = rest.solve(model, detection);
+        self.held_by = HeldBy::Rest;
+        equilibrium.energy = rest.energy;
+        for (i, row) in rest.rows.iter().enumerate().filter(|(_, row)| row.multiplier > 0.0) {
+            let carriers: Vec<(u32, f64)> = row.carriers.iter().collect();
+            push_back(node_forces, marked, touched, &carriers, row.normal * row.multiplier);
+            equilibrium.touches.push(Touch { proxy_node: row.proxy_node, carriers, force: rest.force(i) });
         }
         outcome
     }
@@ -283,6 +298,13 @@ impl<'a> Solver<'a> {
             equilibrium.forces.push(NodeForce { node, force });
         }
         self.touched.clear();
+    }
+}
+
+/// Adds the reaction to `force` on a proxy node to the forces on the nodes that carry it.
+fn push_back(sums: &mut [DVec3], marked: &mut [bool], touched: &mut Vec<u32>, carriers: &[(u32, f64)], force: DVec3) {
+    for &(node, weight) in carriers.iter().filter(|(_, weight)| *weight != 0.0) {
+        push(sums, marked, touched, node, -force * weight);
     }
 }
 

@@ -72,7 +72,7 @@ pub enum GpuError {
     )]
     NoClock(String),
     /// The kernels do not do this.
-    #[error("the GPU does not solve contact with {0}. Use --backend cpu, or leave `{0}` out of [contact]")]
+    #[error("the GPU does not solve contact by the algorithm `{0}`. Use --backend cpu, or --algorithm energy")]
     Unsupported(&'static str),
     /// Outputs that no invocation wrote: a dispatch was cut short.
     #[error(

@@ -56,7 +56,6 @@ pub struct SearchParameters {
     pub bulge: f64,
     pub least_scale: f64,
     pub least_distance: f64,
-    pub softest: f64,
 }
 
 impl SearchParameters {
@@ -125,8 +124,7 @@ mod tests {
             SearchParameters: configurations, first, joints, proxy_nodes, surface_nodes, triangles, leaves,
             covered, contacts, support, carriers, max_iterations, reals, words, room,
             at_net, at_masks, at_order, at_carriers, at_shapes, at_covered, at_links,
-            gap_band, known_to, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance,
-            softest
+            gap_band, known_to, first_kc, kc, tolerance, mobility, bulge_mobility, bulge, least_scale, least_distance
         );
         compare(&[(name, members.clone(), size)], &reflect(Precision::Double));
         let first = offset_of!(SearchParameters, gap_band) as u32;

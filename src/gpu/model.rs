@@ -69,8 +69,8 @@ impl DeviceModel {
     /// When a buffer exceeds the device's limits or memory.
     pub fn new(context: &Context, model: &contact::Model<'_>, precision: Precision) -> Result<Self, GpuError> {
         let contact::Model { object, chain, compliance, contact, .. } = model;
-        if contact.updates > 0 {
-            return Err(GpuError::Unsupported("updates"));
+        if contact.algorithm == Algorithm::Rest {
+            return Err(GpuError::Unsupported(Algorithm::Rest.name()));
         }
         if !compliance.is_whole() && contact.algorithm == Algorithm::Paper {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });

@@ -86,7 +86,6 @@ impl Search {
         let smooth = flag("SMOOTH", model.is_smooth);
         let law = [
             flag("ISOTROPIC", model.is_isotropic),
-            flag("FROZEN", model.algorithm == Algorithm::Linearised),
             flag("PAPER", model.algorithm == Algorithm::Paper),
             flag("WITH_TANGENT", model.with_tangent),
         ];
@@ -99,7 +98,7 @@ impl Search {
         let round = match model.algorithm {
             // Ties are found among all nodes: more invocations share these.
             Algorithm::Paper => vec![detect, kernel(&shaders::SEARCH_PAPER, &[smooth, budget])?, unfinished],
-            Algorithm::Energy | Algorithm::Linearised => {
+            Algorithm::Energy | Algorithm::Rest => {
                 let judge = kernel(&shaders::SEARCH_JUDGE, &[lanes, budget])?;
                 vec![detect, judge, kernel(&shaders::SEARCH_STEP, &[lanes, budget])?, unfinished]
             }

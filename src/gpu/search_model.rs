@@ -93,7 +93,6 @@ impl SearchModel {
             bulge: model.surface.bulge,
             least_scale: limits.depth_rounding / limits.tolerance * model.max_nodal_compliance.sqrt(),
             least_distance: limits.least_distance,
-            softest: model.max_nodal_compliance,
             ..parts.parameters
         };
         parameters.words = words(&parameters);
@@ -144,7 +143,7 @@ impl Limits {
         };
         let first_kc = match contact.algorithm {
             Algorithm::Energy => kc.min(CONTINUATION_START / model.max_nodal_compliance),
-            Algorithm::Linearised | Algorithm::Paper => kc,
+            Algorithm::Rest | Algorithm::Paper => kc,
         };
         match precision {
             Precision::Double => Self {

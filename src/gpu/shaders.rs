@@ -136,8 +136,7 @@ const SMOOTH: &[(&str, f64)] = &[("SMOOTH", 1.0)];
 /// The compliance has one number for a pair of nodes.
 const ISOTROPIC: &[(&str, f64)] = &[("ISOTROPIC", 1.0)];
 
-/// Contact is linearised; equilibria are those of the paper's iteration.
-const FROZEN: &[(&str, f64)] = &[("FROZEN", 1.0)];
+/// Equilibria are those of the paper's iteration.
 const PAPER: &[(&str, f64)] = &[("PAPER", 1.0)];
 
 /// Search: workspaces and joint axes.
@@ -166,7 +165,7 @@ pub static SEARCH_DETECT: [Shader; 2] = in_both(stage(
         DEPTH_ROWS,
         include_str!("../../shaders/search_detect.wgsl"),
     ],
-    &[&[], SMOOTH, ISOTROPIC, FROZEN, PAPER],
+    &[&[], SMOOTH, ISOTROPIC, PAPER],
 ));
 
 /// Search: the trial judged.
@@ -174,7 +173,7 @@ pub static SEARCH_JUDGE: [Shader; 2] = in_both(stage(
     "search_judge",
     "main",
     &[SEARCH_TYPES, WORKSPACE, SEARCH_STATE, LISTING, SEARCH_SUPPORT, include_str!("../../shaders/search_judge.wgsl")],
-    &[&[], ISOTROPIC, FROZEN],
+    &[&[], ISOTROPIC],
 ));
 
 /// Search: from one trial to the next.
@@ -191,7 +190,7 @@ pub static SEARCH_STEP: [Shader; 2] = in_both(stage(
         include_str!("../../shaders/search_woodbury.wgsl"),
         include_str!("../../shaders/search_step.wgsl"),
     ],
-    &[&[], ISOTROPIC, FROZEN],
+    &[&[], ISOTROPIC],
 ));
 
 /// Search: a pass of the paper's iteration.

@@ -5,8 +5,8 @@ use super::value::{KEY, Range, defaults, positive, share};
 use super::{ProxySpec, SceneError};
 use serde::de::{Deserialize, Deserializer, Error};
 
-/// Most updates of linearised contact (1): far more than where it settles, and still milliseconds for a configuration.
-const MAX_UPDATES: u32 = 1000;
+/// What [`Algorithm::Rest`] took the place of; datasets of it are still read.
+const LINEARISED: &str = "linearised";
 
 /// Equation (2) and how it is solved.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
@@ -22,7 +22,7 @@ pub struct ContactSpec {
     #[serde(default, deserialize_with = "positive")]
     pub stiffness_per_length: Option<f64>,
     /// How equation (2) is solved.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "algorithm")]
     pub algorithm: Algorithm,
     /// Relative residual at which a configuration counts as converged (1).
     #[serde(default = "tolerance", deserialize_with = "share")]
@@ -30,9 +30,6 @@ pub struct ContactSpec {
     /// After as many a configuration that has not converged is flagged.
     #[serde(default = "max_iterations", deserialize_with = "at_least_one")]
     pub max_iterations: u32,
-    /// How often linearised contact updates its geometry, at the displacement found.
-    #[serde(default, deserialize_with = "updates")]
-    pub updates: u32,
     /// Which surface the proxy feels.
     #[serde(default)]
     pub surface: ContactSurface,
@@ -75,16 +72,16 @@ impl ContactSpec {
 }
 
 /// How equation (2) is solved for one configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Algorithm {
     /// Minimum of the stored energy; geometry follows the deformation.
     #[default]
     Energy,
     /// The paper's four-step iteration (section 2.1).
     Paper,
-    /// Minimum of the stored energy with the geometry frozen, at rest or at the last of its updates.
-    Linearised,
+    /// Minimum of the stored energy with depths and directions before the surface at rest: a convex problem, with one
+    /// solution.
+    Rest,
 }
 
 impl Algorithm {
@@ -94,7 +91,7 @@ impl Algorithm {
         match self {
             Self::Energy => "energy",
             Self::Paper => "paper",
-            Self::Linearised => "linearised",
+            Self::Rest => "rest",
         }
     }
 }
@@ -115,15 +112,20 @@ fn at_least_one<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
     }
 }
 
-fn updates<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
-    let updates = u32::deserialize(value)?;
-    if updates > MAX_UPDATES {
-        return Err(D::Error::custom(format!(
-            "{KEY}is {updates}: it must be at most {MAX_UPDATES}; where it does not settle with fewer, take algorithm \
-             = \"energy\""
-        )));
-    }
-    Ok(updates)
+/// Reads how contact is solved, by its name.
+fn algorithm<'de, D: Deserializer<'de>>(value: D) -> Result<Algorithm, D::Error> {
+    let name = String::deserialize(value)?;
+    let known = <Algorithm as clap::ValueEnum>::value_variants();
+    known.iter().copied().find(|known| known.name() == name).ok_or_else(|| {
+        let names: Vec<String> = known.iter().map(|known| format!("`{}`", known.name())).collect();
+        D::Error::custom(if name == LINEARISED {
+            format!(
+                "the algorithm {LINEARISED:?} is no more, its torque was not the gradient of its energy: take \"rest\""
+            )
+        } else {
+            format!("unknown algorithm {name:?}: take one of {}", names.join(", "))
+        })
+    })
 }
 
 /// Reads a stiffness: a positive number, or `"rigid"` for infinity.
@@ -157,11 +159,6 @@ impl ContactSpec {
                 return error("stiffness", message);
             }
         }
-        if self.algorithm != Algorithm::Linearised && checker.has("contact.updates") {
-            let message = "updates acts on linearised contact, whose geometry is frozen: add algorithm = \
-                           \"linearised\", or leave it out";
-            return error("updates", message);
-        }
         match (self.surface, self.algorithm) {
             (ContactSurface::Smooth, Algorithm::Paper) if checker.has("contact.surface") => {
                 let message =
@@ -172,9 +169,7 @@ impl ContactSpec {
                 self.surface = ContactSurface::Facets;
                 Ok(())
             }
-            (ContactSurface::Facets, Algorithm::Energy | Algorithm::Linearised)
-                if nodes().any(|node| node.radius > 0.0) =>
-            {
+            (ContactSurface::Facets, Algorithm::Energy | Algorithm::Rest) if nodes().any(|node| node.radius > 0.0) => {
                 let message = "nodes with a radius do not balance where the closest triangle changes: leave surface \
                                out, and they touch the smooth surface";
                 error("surface", message)

@@ -50,7 +50,7 @@ mod tests {
         scene.grid.axes[1].count = 9;
         scene.grid.axes[2].count = 13;
         scene.contact.tolerance = 3e-5;
-        scene.contact.algorithm = Algorithm::Linearised;
+        scene.contact.algorithm = Algorithm::Rest;
         scene.haptics.interpolation = Interpolation::Potential;
         let own = scene.with_own_text().unwrap();
         assert_eq!(Scene { text: String::new(), ..own.clone() }, Scene { text: String::new(), ..scene.clone() });

@@ -204,7 +204,7 @@ impl Controls {
                 .width(CHOICE_WIDTH)
                 .selected_text(contact.algorithm.name())
                 .show_ui(ui, |ui| {
-                    for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Linearised] {
+                    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
                         ui.selectable_value(&mut contact.algorithm, algorithm, algorithm.name());
                     }
                 })

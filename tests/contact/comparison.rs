@@ -14,7 +14,7 @@ fn solve(object: &Object, chain: &Chain, algorithm: Algorithm, stiffness: f64, q
 
 /// The geometry's effect is of first order in the depth.
 #[test]
-fn linearised_contact_tends_to_the_energy_form_as_depth_tends_to_zero() {
+fn contact_at_rest_tends_to_the_energy_form_as_depth_tends_to_zero() {
     let object = sphere(SpringKind::Isotropic);
     let triangle = object.triangles[57].map(|node| object.rest[node as usize]);
     let point = triangle[0] * 0.5 + triangle[1] * 0.3 + triangle[2] * 0.2;
@@ -22,7 +22,7 @@ fn linearised_contact_tends_to_the_energy_form_as_depth_tends_to_zero() {
     let chain = probe(point, -normal);
     let difference = |depth: f64| {
         let exact = solve(&object, &chain, Algorithm::Energy, 1e3, &[depth]);
-        let linear = solve(&object, &chain, Algorithm::Linearised, 1e3, &[depth]);
+        let linear = solve(&object, &chain, Algorithm::Rest, 1e3, &[depth]);
         assert!(exact.status == Status::Contact && linear.status == Status::Contact);
         (exact.torque[0] - linear.torque[0]).abs() / exact.torque[0].abs()
     };
@@ -93,13 +93,13 @@ fn the_papers_iteration_says_when_it_has_lost_contact() {
     assert!(shares.windows(2).all(|pair| pair[1] <= pair[0]), "{shares:?}");
 }
 
-/// Nodes that are free at rest may be touched by the surface bulging: the frozen problem keeps their rows too. A stiff
+/// Nodes that are free at rest may be touched by the surface bulging: the problem at rest gives them rows, too. A stiff
 /// tie checks that its law holds for every proxy node.
 #[test]
-fn linearised_contact_obeys_its_law_at_every_node() {
+fn contact_at_rest_obeys_its_law_at_every_node() {
     let object = sphere(SpringKind::Axial);
     let chain = Chain::new(&arm(0.0));
-    let model = Model::new(&object, &chain, contact(Algorithm::Linearised, 1e3));
+    let model = Model::new(&object, &chain, contact(Algorithm::Rest, 1e3));
     let mut solver = Solver::new(&model);
     let mut touching = 0;
     for q in random_configurations(9, 80) {
@@ -119,7 +119,9 @@ fn linearised_contact_obeys_its_law_at_every_node() {
             let force = equilibrium.touches.iter().find(|touch| touch.proxy_node as usize == i);
             let force = force.map_or(glam::DVec3::ZERO, |touch| touch.force);
             let law = at.normal * (3e3 * depth.max(0.0));
-            assert!((force - law).length() < 1e-6 * (1.0 + law.length()), "node {i}: {force} {law}");
+            // Sideways the row's change along the surface pushes; the law is along the normal.
+            let along = at.normal * at.normal.dot(force);
+            assert!((along - law).length() < 1e-6 * (1.0 + law.length()), "node {i}: {force} {law}");
         }
     }
     assert!(touching > 20);
@@ -130,47 +132,9 @@ fn linearised_contact_obeys_its_law_at_every_node() {
 fn a_node_at_the_centre_ends() {
     let object = sphere(SpringKind::Isotropic);
     let chain = probe(SPHERE_CENTRE, glam::DVec3::Z);
-    for algorithm in [Algorithm::Energy, Algorithm::Linearised, Algorithm::Paper] {
+    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
         let equilibrium = solve(&object, &chain, algorithm, 500.0, &[0.0]);
         assert_ne!(equilibrium.status, Status::Free);
         assert!(equilibrium.energy.is_finite() && equilibrium.torque.is_finite());
     }
-}
-
-/// Each update of linearised contact comes nearer to the energy form, whose fixed point it shares; with many, half of
-/// the configurations at least have reached it.
-#[test]
-fn updates_lead_from_linearised_contact_to_the_energy_form() {
-    let object = sphere(SpringKind::Isotropic);
-    let chain = Chain::new(&arm(0.0));
-    let mut model = Model::new(&object, &chain, contact(Algorithm::Energy, 300.0));
-    let places: Vec<Vec<f64>> = {
-        let mut solver = Solver::new(&model);
-        let shallow = |q: &Vec<f64>| (-0.005..0.0).contains(&solver.gap(q));
-        random_configurations(9, 600).into_iter().filter(shallow).collect()
-    };
-    let exact: Vec<Equilibrium> = {
-        let mut solver = Solver::new(&model);
-        places.iter().map(|q| solver.solve(q)).collect()
-    };
-    model.contact.algorithm = Algorithm::Linearised;
-    let mut errors = Vec::new();
-    for updates in [0, 1, 2, 4, 60] {
-        model.contact.updates = updates;
-        let mut solver = Solver::new(&model);
-        let mut found: Vec<f64> = places
-            .iter()
-            .zip(&exact)
-            .map(|(q, exact)| {
-                let torque = solver.solve(q).torque;
-                let off = torque.iter().zip(exact.torque.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
-                off / exact.torque.norm()
-            })
-            .collect();
-        found.sort_by(f64::total_cmp);
-        errors.push(found[found.len() / 2]);
-    }
-    assert!(places.len() > 20, "{}", places.len());
-    assert!(errors[0] > 1e-3 && errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
-    assert!(errors[4] < 1e-6, "{errors:?}");
 }

@@ -10,3 +10,4 @@ mod fixture;
 mod invariance;
 mod oracle;
 mod refinement;
+mod rest;

@@ -178,14 +178,12 @@ fn check_solver(name: &str, model: &Model, mut gpu: GpuSolver, configurations: &
 #[test]
 fn the_sphere_has_the_same_equilibria_on_gpu_and_cpu() {
     check_scene("sphere.toml", None, Algorithm::Energy, 131);
-    check_scene("sphere.toml", None, Algorithm::Linearised, 131);
     check_scene("sphere.toml", None, Algorithm::Paper, 131);
 }
 
 #[test]
 fn the_mesh_has_the_same_equilibria_on_gpu_and_cpu() {
     check_scene("mesh.toml", None, Algorithm::Energy, 101);
-    check_scene("mesh.toml", None, Algorithm::Linearised, 101);
     check_scene("mesh.toml", None, Algorithm::Paper, 101);
 }
 
@@ -216,7 +214,6 @@ fn the_smooth_surface_has_the_same_equilibria_on_gpu_and_cpu() {
 fn objects_that_are_not_isotropic_have_the_same_equilibria_on_gpu_and_cpu() {
     for material in [AXIAL, SOLID] {
         check_scene("sphere.toml", Some(material.clone()), Algorithm::Energy, 131);
-        check_scene("sphere.toml", Some(material.clone()), Algorithm::Linearised, 131);
         check_scene("sphere.toml", Some(material), Algorithm::Paper, 37);
     }
 }
@@ -237,9 +234,7 @@ fn part<'a>((scene, object, chain): &'a (Scene, Object, Chain), algorithm: Algor
 fn a_part_of_the_compliance_gives_the_cpus_equilibria() {
     let [isotropic, axial] = [None, Some(AXIAL)].map(|material| load_of("sphere.toml", material));
     let configurations = configurations(&isotropic.0, 11, 131);
-    for (algorithm, of) in
-        [(Algorithm::Energy, &isotropic), (Algorithm::Energy, &axial), (Algorithm::Linearised, &isotropic)]
-    {
+    for (algorithm, of) in [(Algorithm::Energy, &isotropic), (Algorithm::Energy, &axial)] {
         let model = part(of, algorithm);
         let mut cpu = Solver::new(&model);
         let (mut touching, mut beyond) = (0, 0);
@@ -518,16 +513,16 @@ fn no_configuration_is_no_work() {
     assert!(GpuSolver::new(context(), &model).unwrap().solve(&[]).unwrap().is_empty());
 }
 
-/// The kernels freeze geometry once: a scene that asks for more is refused, and left to the CPU where the choice is
-/// free.
+/// Contact with the surface at rest is refused, and left to the CPU where the choice is free.
 #[test]
-fn updates_are_refused() {
+fn contact_at_rest_is_refused() {
     let (scene, object, chain) = load("sphere.toml");
     let mut model = Model::new(&object, &chain, scene.contact);
     assert!(GpuSolver::new(context(), &model).is_ok());
-    model.contact.updates = 1;
+    model.contact.algorithm = Algorithm::Rest;
     let refusal = GpuSolver::new(context(), &model).err().unwrap();
-    assert!(matches!(refusal, GpuError::Unsupported("updates")), "{refusal}");
+    assert!(matches!(refusal, GpuError::Unsupported("rest")), "{refusal}");
+    assert!(refusal.to_string().contains("--backend cpu"), "{refusal}");
 }
 
 /// The scene's tolerance is what accuracy costs on the GPU too: the rougher it is the fewer steps are taken, in f32 and

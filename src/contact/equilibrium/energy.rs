@@ -8,10 +8,6 @@
 //! Stiff contact is reached in stages of growing kc, each from the state before: E has then the shape of a steep and
 //! bent valley, whose floor soft contact finds and stiffer contact only corrects. A stage's end never lies above the
 //! rest state in E at the final kc: E_s(u_s) <= E_s(0) bounds both its elastic energy and its depths by those at rest.
-//!
-//! With the geometry frozen at rest (`linearised`) the same steps minimise the convex
-//! `1/2 u^T K u + 1/2 kc sum_i max(0, depth_i(0) + sum_j w_j N . u_j)^2`; each of its updates freezes the geometry
-//! again at the displacement found and solves again.
 
 use super::newton::{Damping, Newton, Step};
 use super::tangent;
@@ -88,15 +84,6 @@ pub const NUDGE_LENGTH: f64 = 0.1;
 /// See [`NUDGE_LENGTH`]: after these, the fall of the energy, of second order, would be below rounding.
 pub const NUDGE_HALVINGS: u32 = 20;
 
-/// Where depth comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Geometry {
-    /// The closest point of the deformed surface, found again at every displacement.
-    Deformed,
-    /// The closest points at rest, or at the last update.
-    Frozen,
-}
-
 /// One state of the search.
 #[derive(Default)]
 pub struct State {
@@ -151,8 +138,6 @@ pub struct EnergySearch {
     displacement: Vec<f64>,
     newton: Newton,
     damping: Damping,
-    /// Rows of the frozen problem, with their depths at rest.
-    frozen: Vec<Contact>,
     /// E at the start of the last stage and after each step taken since (J).
     pub history: Vec<f64>,
 }
@@ -175,30 +160,18 @@ impl EnergySearch {
             displacement: Vec::new(),
             newton: Newton::default(),
             damping: Damping::default(),
-            frozen: Vec::new(),
             history: Vec::new(),
         }
     }
 
     /// The equilibrium of the configuration that `detection` has taken up, searched from the rest state.
-    pub fn search(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> SolverStats {
-        self.kc = match geometry {
-            Geometry::Deformed => model.kc.min(CONTINUATION_START / model.max_nodal_compliance),
-            Geometry::Frozen => model.kc,
-        };
+    pub fn search(&mut self, model: &Model, detection: &mut Detection) -> SolverStats {
+        self.kc = model.kc.min(CONTINUATION_START / model.max_nodal_compliance);
         self.last_kc = model.kc;
-        self.start(model, detection, geometry);
+        self.start(model, detection);
         let mut outcome = SolverStats { converged: false, iterations: 0, residual: f64::MAX };
         let limits = StoppingCriteria { tolerance: model.contact.tolerance, iterations: model.contact.max_iterations };
-        self.descend(model, detection, geometry, limits, &mut outcome);
-        let updates = if geometry == Geometry::Frozen { model.contact.updates } else { 0 };
-        for _ in 0..updates {
-            if !outcome.converged {
-                break;
-            }
-            self.freeze_here(model, detection);
-            self.descend(model, detection, geometry, limits, &mut outcome);
-        }
+        self.descend(model, detection, limits, &mut outcome);
         SolverStats { residual: self.imbalance, ..outcome }
     }
 
@@ -208,25 +181,21 @@ impl EnergySearch {
         &mut self,
         model: &Model,
         detection: &mut Detection,
-        geometry: Geometry,
         (forces, kc): (&[NodeForce], f64),
         limits: StoppingCriteria,
     ) -> SolverStats {
         (self.kc, self.last_kc) = (kc, model.kc);
         self.support.clear();
-        if geometry == Geometry::Frozen {
-            self.start(model, detection, geometry);
-        }
         self.trial.forces.clear();
         for &NodeForce { node, force } in forces {
             let at = 3 * self.support.add(node);
             self.trial.forces.resize(self.support.order(), 0.0);
             self.trial.forces[at..at + 3].iter_mut().zip(force.to_array()).for_each(|(sum, part)| *sum += part);
         }
-        self.take_trial(model, detection, geometry);
+        self.take_trial(model, detection);
         self.kc = model.kc;
         let mut outcome = SolverStats { converged: false, iterations: 0, residual: f64::MAX };
-        self.descend(model, detection, geometry, limits, &mut outcome);
+        self.descend(model, detection, limits, &mut outcome);
         SolverStats { residual: self.imbalance, ..outcome }
     }
 
@@ -241,8 +210,8 @@ impl EnergySearch {
     }
 
     /// Takes what the trial's forces lead to for the state.
-    fn take_trial(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
-        self.evaluate(model, detection, geometry);
+    fn take_trial(&mut self, model: &Model, detection: &mut Detection) {
+        self.evaluate(model, detection);
         std::mem::swap(&mut self.state, &mut self.trial);
         self.weigh_curvature();
     }
@@ -252,7 +221,6 @@ impl EnergySearch {
         &mut self,
         model: &Model,
         detection: &mut Detection,
-        geometry: Geometry,
         limits: StoppingCriteria,
         outcome: &mut SolverStats,
     ) {
@@ -269,7 +237,7 @@ impl EnergySearch {
                 continue;
             }
             let balanced = self.kc == self.last_kc && outcome.residual <= limits.tolerance;
-            if balanced && outcome.iterations < limits.iterations && self.leave_saddle(model, detection, geometry) {
+            if balanced && outcome.iterations < limits.iterations && self.leave_saddle(model, detection) {
                 outcome.iterations += 1;
                 outcome.residual = self.update_residual(model);
                 continue;
@@ -280,7 +248,7 @@ impl EnergySearch {
             }
             outcome.iterations += 1;
             let step = self.step(outcome.residual);
-            self.try_step(model, detection, geometry);
+            self.try_step(model, detection);
             // Near the solution both decreases drown in rounding, which must not refuse a good step.
             let rounding = self.energy_rounding(detection.nodes());
             let promised = step.predicted + rounding;
@@ -317,19 +285,6 @@ impl EnergySearch {
         step
     }
 
-    /// Freezes the geometry again, as it is at the current displacement: an update of linearised contact.
-    fn freeze_here(&mut self, model: &Model, detection: &mut Detection) {
-        self.displace(model, detection, &self.state.forces, self.state.elastic);
-        let Self { state, frozen, .. } = self;
-        detection.deformed(model, frozen);
-        frozen.iter_mut().for_each(Contact::freeze);
-        // Depths at rest, by the slopes here.
-        for row in frozen.iter_mut() {
-            row.depth -= linear_change(model, row, detection);
-        }
-        frozen_contacts(model, frozen, detection, &mut state.contacts);
-    }
-
     /// Displaces the surface by `forces` on the support, which store the energy `elastic` (J).
     fn displace(&self, model: &Model, detection: &mut Detection, forces: &[f64], elastic: f64) {
         detection.displace(model, self.support.nodes(), forces, model.motion_bound(elastic));
@@ -337,11 +292,7 @@ impl EnergySearch {
 
     /// Takes a step from a balanced state that is no minimum but a saddle of E, along a direction of negative
     /// curvature, to a state of less energy; false where there is none.
-    fn leave_saddle(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) -> bool {
-        if geometry == Geometry::Frozen {
-            // A convex problem has no saddle.
-            return false;
-        }
+    fn leave_saddle(&mut self, model: &Model, detection: &mut Detection) -> bool {
         self.weigh_curvature();
         let Self { state, slots, support, newton, kc, product, .. } = self;
         let springs = Springs { contacts: &state.contacts, slots, kc: *kc };
@@ -360,7 +311,7 @@ impl EnergySearch {
             for side in [step, -step] {
                 self.trial.forces.clear();
                 self.trial.forces.extend(self.state.forces.iter().zip(&descent).map(|(f, along)| f + side * along));
-                self.evaluate(model, detection, geometry);
+                self.evaluate(model, detection);
                 if self.trial.energy < fallen {
                     std::mem::swap(&mut self.state, &mut self.trial);
                     self.weigh_curvature();
@@ -400,20 +351,12 @@ impl EnergySearch {
     }
 
     /// The rest state.
-    fn start(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
+    fn start(&mut self, model: &Model, detection: &mut Detection) {
         self.support.clear();
         self.state.forces.clear();
         self.state.elastic = 0.0;
         detection.displace(model, &[], &[], MotionBound { moved: 0.0, bulge: model.surface.bulge });
         detection.deformed(model, &mut self.state.contacts);
-        if geometry == Geometry::Frozen {
-            // 1/2 |u|^2 <= E <= E(0) in the energy norm and |u_j|^2 <= trace(C_jj) |u|^2, all along the search: nodes
-            // farther from the surface than this can never touch.
-            let energy = contact_energy(&self.state.contacts, self.kc);
-            let reach = (2.0 * energy * model.max_nodal_compliance).sqrt();
-            detection.frozen(model, reach, &mut self.frozen);
-            frozen_contacts(model, &self.frozen, detection, &mut self.state.contacts);
-        }
     }
 
     /// Brings the support, the contact forces and the residual force r = c - f up to date with the current state;
@@ -452,17 +395,17 @@ impl EnergySearch {
     }
 
     /// The state that the last Newton step leads to.
-    fn try_step(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
+    fn try_step(&mut self, model: &Model, detection: &mut Detection) {
         let Self { state, trial, newton, .. } = self;
         trial.forces.clear();
         trial.forces.extend(state.forces.iter().zip(&newton.force).map(|(f, df)| f + df));
-        self.evaluate(model, detection, geometry);
+        self.evaluate(model, detection);
         let Self { state, trial, newton, .. } = self;
         predict_multipliers(&mut trial.contacts, &state.contacts, |k| self.kc * newton.forces_over_kc[k]);
     }
 
     /// Displacement, contacts and energy that the trial's forces lead to.
-    fn evaluate(&mut self, model: &Model, detection: &mut Detection, geometry: Geometry) {
+    fn evaluate(&mut self, model: &Model, detection: &mut Detection) {
         let Self { trial, support, displacement, .. } = self;
         support.gather(&model.compliance);
         displacement.resize(support.order(), 0.0);
@@ -470,10 +413,7 @@ impl EnergySearch {
         trial.elastic = 0.5 * dot(&trial.forces, displacement);
         self.displace(model, detection, &self.trial.forces, self.trial.elastic);
         let contacts = &mut self.trial.contacts;
-        match geometry {
-            Geometry::Deformed => detection.deformed(model, contacts),
-            Geometry::Frozen => frozen_contacts(model, &self.frozen, detection, contacts),
-        }
+        detection.deformed(model, contacts);
         self.trial.energy = self.trial.elastic + contact_energy(contacts, self.kc);
     }
 
@@ -509,19 +449,4 @@ pub fn contact_energy(contacts: &[Contact], kc: f64) -> f64 {
         sum += contact.force_over_kc() * contact.depth;
     }
     0.5 * kc * sum
-}
-
-/// Rows of the frozen problem with their depths at the displacement that `detection` has taken up.
-fn frozen_contacts(model: &Model, rows: &[Contact], detection: &mut Detection, contacts: &mut Vec<Contact>) {
-    contacts.clear();
-    contacts.extend(rows.iter().map(|row| Contact { depth: row.depth + linear_change(model, row, detection), ..*row }));
-}
-
-/// Returns by how much that displacement deepens a frozen row (m).
-fn linear_change(model: &Model, row: &Contact, detection: &mut Detection) -> f64 {
-    let mut sum = DVec3::ZERO;
-    for (node, weight) in row.carriers.iter() {
-        sum += detection.displacement(model, node) * weight;
-    }
-    row.normal.dot(sum)
 }

@@ -50,16 +50,8 @@ impl Woodbury {
         for (a, &row) in taken.iter().enumerate() {
             let column = &mut columns[a * *order..][..*order];
             let contact = &springs.contacts[row];
-            let isotropic = support.respond_along(contact.normal, carrying(springs, row), scalars, column);
-            for (b, &other) in taken[..=a].iter().enumerate() {
-                let deepened = if isotropic {
-                    let along = carrying(springs, other).map(|(slot, weight)| weight * scalars[slot]).sum::<f64>();
-                    contact.normal.dot(springs.contacts[other].normal) * along
-                } else {
-                    springs.depth_change(other, column)
-                };
-                factor[a * count + b] = deepened;
-            }
+            let deepened = &mut factor[a * count..][..=a];
+            springs.respond(support, (row, taken[..=a].iter().copied()), (scalars, column), deepened);
             factor[a * count + a] += stiffening / (springs.kc * contact.share);
         }
         cholesky::factorize(factor, count);
@@ -90,12 +82,6 @@ impl Woodbury {
             force.iter_mut().chain(displacement).for_each(|entry| *entry /= *stiffening);
         }
     }
-}
-
-/// The slots of a row's nodes on the support, with their weights.
-fn carrying(springs: Springs<'_>, row: usize) -> impl Iterator<Item = (usize, f64)> + Clone {
-    let slots = springs.slots[row].iter().map(|&slot| slot as usize);
-    slots.zip(springs.contacts[row].carriers.weights().iter().copied())
 }
 
 #[cfg(test)]

@@ -356,11 +356,6 @@ impl Contact {
         let turn = |a: usize| *normal * -(carried[a] + curvature.distance * turned[a]);
         Variation { point: across * curvature.inverse_distance + along(0) + along(1), tangents: [turn(0), turn(1)] }
     }
-
-    /// Its depth changes in proportion to displacements from here on.
-    pub fn freeze(&mut self) {
-        self.curvature = Curvature::default();
-    }
 }
 
 #[cfg(test)]

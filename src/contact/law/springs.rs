@@ -2,6 +2,7 @@
 
 use super::depth::{Contact, Variation};
 use crate::contact::geometry::smooth::CARRIERS;
+use crate::contact::linear::support::Support;
 use glam::DVec3;
 
 /// The slots of a row's nodes on the support, by their place; nodes without weight have any.
@@ -42,6 +43,34 @@ impl<'a> Springs<'a> {
     pub fn depth_change(self, k: usize, vector: &[f64]) -> f64 {
         let (nodes, slots, row) = (vector.as_chunks::<3>().0, &self.slots[k], &self.contacts[k]);
         row.normal.dot(row.moved(|j| DVec3::from_array(nodes[slots[j] as usize])))
+    }
+
+    /// Sets `column` to the displacement of the support under a force of one newton along row `k`, C g_k, and
+    /// `deepened` to by how much that deepens each of the rows `others`. `scalars` is room for the column along the
+    /// row's normal (m/N).
+    pub fn respond(
+        self,
+        support: &Support,
+        (k, others): (usize, impl Iterator<Item = usize>),
+        (scalars, column): (&mut Vec<f64>, &mut [f64]),
+        deepened: &mut [f64],
+    ) {
+        let normal = self.contacts[k].normal;
+        let isotropic = support.respond_along(normal, self.carrying(k), scalars, column);
+        for (deepened, other) in deepened.iter_mut().zip(others) {
+            *deepened = if isotropic {
+                let along = self.carrying(other).map(|(slot, weight)| weight * scalars[slot]).sum::<f64>();
+                normal.dot(self.contacts[other].normal) * along
+            } else {
+                self.depth_change(other, column)
+            };
+        }
+    }
+
+    /// The slots of a row's nodes on the support, with their weights.
+    fn carrying(self, k: usize) -> impl Iterator<Item = (usize, f64)> + Clone + 'a {
+        let slots = self.slots[k].iter().map(|&slot| slot as usize);
+        slots.zip(self.contacts[k].carriers.weights().iter().copied())
     }
 
     /// Adds a reaction of row `k` to the forces `vector` on the support.

@@ -83,13 +83,13 @@ pub(super) fn loops(accuracy: &Accuracy) -> Canvas {
 pub(super) fn solver(accuracy: &Accuracy) -> Canvas {
     let mut sheet = Diagram::new(
         "Error of a solved configuration against its time",
-        "tolerance of the energy form, updates of linearised contact, the paper's iteration, arithmetic",
+        "tolerance of the energy form, the surface at rest, the paper's iteration, arithmetic",
         1,
     );
     let curves = |place: fn(&Row) -> (f64, f64)| {
         let mut curves = series(accuracy, Study::Tolerance, place);
         curves.iter_mut().for_each(|curve| curve.name = "tolerance".to_owned());
-        for study in [Study::Updates, Study::Algorithm, Study::Arithmetic] {
+        for study in [Study::Algorithm, Study::Arithmetic] {
             for mut curve in series(accuracy, study, place) {
                 curve.colour = curves.len();
                 curves.push(curve);

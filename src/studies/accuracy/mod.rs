@@ -46,8 +46,6 @@ pub enum Study {
     Spacing,
     /// Tolerance of the contact solver; cost is a configuration.
     Tolerance,
-    /// Updates of linearised contact's geometry; cost is a configuration.
-    Updates,
     /// How contact is solved; cost is a configuration.
     Algorithm,
     /// f64 and f32 on the GPU against the CPU; cost is a configuration.

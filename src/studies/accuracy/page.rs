@@ -63,8 +63,8 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
         (
             "accuracy-solver",
             figures::solver(accuracy),
-            "A tolerance below the knee buys nothing that interpolation does not throw away. Linearised contact \
-             freezes the geometry, at rest and again at each update (0 to 8 along its curve); the paper's iteration \
+            "A tolerance below the knee buys nothing that interpolation does not throw away. `rest` \
+             takes depths and directions before the surface at rest, which is another law; the paper's iteration \
              has its own fixed point, or none: the table counts what did not converge.",
         ),
         (
@@ -116,7 +116,6 @@ fn study_name(study: Study) -> &'static str {
     match study {
         Study::Spacing => "spacing",
         Study::Tolerance => "tolerance",
-        Study::Updates => "updates",
         Study::Algorithm => "algorithm",
         Study::Arithmetic => "arithmetic",
         Study::Mesh => "mesh",

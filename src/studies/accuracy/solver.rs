@@ -16,9 +16,6 @@ use crate::{
 /// Relative residuals that are asked for.
 const TOLERANCES: [f64; 6] = [0.3, 0.1, 1e-2, 1e-3, 1e-5, 1e-8];
 
-/// How often linearised contact updates its geometry.
-const UPDATES: [u32; 5] = [0, 1, 2, 4, 8];
-
 /// Configurations on the GPU: as many as a software adapter solves in some seconds.
 const GPU_CONFIGURATIONS: usize = 256;
 
@@ -63,16 +60,12 @@ pub(super) fn settings(
         let contact = ContactSpec { tolerance, ..scene.contact };
         (Study::Tolerance, "energy", format!("{tolerance:.0e}"), tolerance, contact)
     });
-    let algorithms = [(Algorithm::Paper, "paper"), (Algorithm::Energy, "energy")];
+    let algorithms = [(Algorithm::Paper, "paper"), (Algorithm::Rest, "rest"), (Algorithm::Energy, "energy")];
     let algorithms = algorithms.map(|(algorithm, name)| {
         (Study::Algorithm, name, name.to_owned(), 0.0, ContactSpec { algorithm, ..scene.contact })
     });
-    let updates = UPDATES.map(|updates| {
-        let contact = ContactSpec { algorithm: Algorithm::Linearised, updates, ..scene.contact };
-        (Study::Updates, "linearised", format!("{updates} updates"), updates.into(), contact)
-    });
     let (baseline, _) = timed(study.rounds, || equilibria(model, scene.contact, &reference.places))?;
-    for (varied, series, mut setting, value, contact) in tolerances.into_iter().chain(updates).chain(algorithms) {
+    for (varied, series, mut setting, value, contact) in tolerances.into_iter().chain(algorithms) {
         let (cost, found) = timed(study.rounds, || equilibria(model, contact, &reference.places))?;
         let lost = found.iter().filter(|e| e.status == Status::Unconverged).count();
         if lost > 0 {

@@ -1,0 +1,187 @@
+//! Contact with the surface at rest: the torque is the gradient of the energy, on every kind of body, at every
+//! stiffness and depth.
+
+use crate::fixture::{arm, random_configurations, sphere, torus};
+use haptize::contact::{Equilibrium, Model, Solver, Status};
+use haptize::fixtures::Random;
+use haptize::fixtures::bodies::{self, PAPER};
+use haptize::object::Object;
+use haptize::proxy::Chain;
+use haptize::scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind};
+
+/// Contact at rest of stiffness kc at a contact point (N/m).
+fn contact(kc: f64) -> ContactSpec {
+    ContactSpec { surface: ContactSurface::Smooth, ..crate::fixture::contact(Algorithm::Rest, kc / 3.0) }
+}
+
+/// An object, an arm, and configurations of it, most of which touch.
+struct Sample {
+    name: &'static str,
+    object: Object,
+    chain: Chain,
+    places: Vec<Vec<f64>>,
+}
+
+/// The shipped scene of this name, with random configurations on its grid.
+fn shipped(name: &'static str, count: usize) -> Sample {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("datasets/{name}.toml"));
+    let scene = Scene::load(path).unwrap();
+    let mut random = Random::new(5);
+    let mut place = || {
+        let axes = scene.grid.axes.iter();
+        axes.map(|axis| random.between(axis.start, axis.start + axis.step * (axis.count - 1) as f64)).collect()
+    };
+    let places = (0..count).map(|_| place()).collect();
+    Sample { name, object: Object::build(&scene.object).unwrap(), chain: Chain::new(&scene.proxy), places }
+}
+
+/// The paper's sphere of an elastic solid.
+fn solid() -> Object {
+    let mut spec = crate::fixture::spec(
+        haptize::scene::Shape::Sphere { centre: crate::fixture::SPHERE_CENTRE, radius: 0.05, rings: 9, segments: 10 },
+        SpringKind::Isotropic,
+    );
+    spec.material =
+        Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.01), inclusions: Vec::new() });
+    Object::build(&spec).unwrap()
+}
+
+fn samples() -> Vec<Sample> {
+    let of = |name, object, radius| Sample {
+        name,
+        object,
+        chain: Chain::new(&arm(radius)),
+        places: random_configurations(7, 24),
+    };
+    vec![
+        of("springs", sphere(SpringKind::Isotropic), 0.0),
+        of("springs along their length, balls", sphere(SpringKind::Axial), 0.008),
+        of("torus", torus(), 0.0),
+        of("solid", solid(), 0.0),
+        shipped("mesh", 60),
+        shipped("touch", 8000),
+        shipped("organ", 200),
+    ]
+}
+
+/// Proxy nodes that push, with the object's nodes that they push on.
+fn touched(equilibrium: &Equilibrium) -> Vec<(u32, Vec<u32>)> {
+    let carriers = |touch: &haptize::contact::Touch| touch.carriers.iter().map(|(node, _)| *node).collect();
+    equilibrium.touches.iter().map(|touch| (touch.proxy_node, carriers(touch))).collect()
+}
+
+/// Step of central differences of the energy (rad or m): the third derivative leaves about its square, rounding of the
+/// energy its 1e-16 over it.
+const STEP: f64 = 1e-6;
+
+/// The largest difference between the torque and minus the central difference of the energy, over the largest entry of
+/// the torque, where contacts neither come nor go nor change facets: there U has no third derivative. None where that
+/// is so along no joint.
+fn gradient_error(solver: &mut Solver<'_>, q: &[f64], here: &Equilibrium) -> Option<f64> {
+    let mut worst: Option<f64> = None;
+    for joint in 0..q.len() {
+        let [before, after] = [-STEP, STEP].map(|step| {
+            let mut moved = q.to_vec();
+            moved[joint] += step;
+            solver.solve(&moved)
+        });
+        if touched(&before) == touched(here) && touched(&after) == touched(here) {
+            let slope = (before.energy - after.energy) / (2.0 * STEP);
+            worst = Some(worst.unwrap_or(0.0).max((slope - here.torque[joint]).abs()));
+        }
+    }
+    let size = here.torque.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
+    worst.map(|worst| worst / size)
+}
+
+#[test]
+fn the_torque_is_the_gradient_of_the_energy() {
+    for Sample { name, object, chain, places } in samples() {
+        for kc in [10.0, 1e3, 1e7, 1e8] {
+            let model = Model::new(&object, &chain, contact(kc));
+            let mut solver = Solver::new(&model);
+            let (mut checked, mut most, mut worst) = (0, 0, 0.0_f64);
+            for q in &places {
+                let here = solver.solve(q);
+                if here.status == Status::Free {
+                    continue;
+                }
+                assert_eq!(here.status, Status::Contact, "{name}, {kc} N/m, {q:?}");
+                if let Some(error) = gradient_error(&mut solver, q, &here) {
+                    worst = worst.max(error);
+                    checked += 1;
+                }
+                most = most.max(here.touches.len());
+            }
+            println!("{name}, {kc:e} N/m: {checked} checked, up to {most} contacts, worst {worst:.1e}");
+            assert!(checked > 3, "{name}, {kc} N/m: {checked}");
+            assert!(worst < 1e-7, "{name}, {kc} N/m: {worst}");
+        }
+    }
+}
+
+/// The forces along the normals alone, which push back on the object, are not the gradient: rows change along the
+/// surface, and the comparison notices that.
+#[test]
+fn the_sideways_part_of_the_force_is_needed() {
+    let (object, chain) = (torus(), Chain::new(&arm(0.0)));
+    let model = Model::new(&object, &chain, contact(1e3));
+    let mut solver = Solver::new(&model);
+    let mut worst = 0.0_f64;
+    for q in random_configurations(7, 60) {
+        let mut here = solver.solve(&q);
+        if here.touches.len() != 1 {
+            continue;
+        }
+        here.torque = haptize::JointVector::zeros(q.len());
+        let node = here.touches[0].proxy_node as usize;
+        let normal: glam::DVec3 = here.forces.iter().map(|force| -force.force).sum();
+        chain.add_torque(solver.pose(), node, normal, &mut here.torque);
+        worst = worst.max(gradient_error(&mut solver, &q, &here).unwrap_or(0.0));
+    }
+    assert!(worst > 1e-3, "{worst}");
+}
+
+/// Hard configurations: a bent bar pressed into the sphere, as deep as its middle, from soft to rigid.
+#[test]
+fn every_configuration_has_its_equilibrium_within_few_steps() {
+    let object = bodies::sphere(PAPER).unwrap();
+    for radius in [0.0, 0.004] {
+        let chain = bodies::floating_bar(radius);
+        for kc in [10.0, 1e4, 1e7, 1e8] {
+            let model = Model::new(&object, &chain, contact(kc));
+            let mut solver = Solver::new(&model);
+            let (mut most, mut touching, mut residual) = (0, 0, 0.0_f64);
+            for q in bodies::pressed(&model, 31, 200, 0.002, 0.045) {
+                let here = solver.solve(&q);
+                assert_eq!(here.status, Status::Contact, "{kc} N/m, {q:?}");
+                most = most.max(here.iterations);
+                touching = touching.max(here.touches.len());
+                residual = residual.max(here.residual);
+            }
+            println!("radius {radius}, {kc:e} N/m: {most} steps, {touching} contacts, residual {residual:.1e}");
+            assert!(most <= 40 && touching > 8 && residual < 1e-12, "{kc} N/m: {most} {touching} {residual}");
+        }
+    }
+}
+
+/// At the depths of the shipped scenes both laws agree, the better the shallower: of the torque, rms over rms.
+#[test]
+fn contact_at_rest_agrees_with_the_energy_form_at_ordinary_depths() {
+    for (name, count, most) in [("mesh", 60, 0.03), ("touch", 8000, 0.001), ("organ", 200, 0.03)] {
+        let Sample { object, chain, places, .. } = shipped(name, count);
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("datasets/{name}.toml"));
+        let energy = Model::new(&object, &chain, Scene::load(path).unwrap().contact);
+        let rest = energy.with_contact(ContactSpec { algorithm: Algorithm::Rest, ..energy.contact });
+        let (mut following, mut at_rest) = (Solver::new(&energy), Solver::new(&rest));
+        let (mut off, mut size) = (0.0, 0.0);
+        for q in &places {
+            let (a, b) = (following.solve(q), at_rest.solve(q));
+            off += a.torque.iter().zip(b.torque.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            size += a.torque.iter().map(|a| a.powi(2)).sum::<f64>();
+        }
+        let ratio = (off / size).sqrt();
+        println!("{name}: {ratio:.5}");
+        assert!(size > 0.0 && ratio > 1e-6 && ratio < most, "{name}: {ratio}");
+    }
+}
