@@ -20,10 +20,6 @@ const TABLES: &str = "object object.sphere object.mesh object.tetrahedra object.
     scan.limits scan.simulated haptics haptics.friction haptics.four_channel haptics.hand graphics.stiffening motion \
     motion.press.* motion.scrape.* device";
 
-/// Keys that are no more, and what to do with each.
-const GONE: [(&str, &str); 1] =
-    [("contact.updates", "updates acted on the algorithm \"linearised\", which is no more: leave it out")];
-
 /// The text that is being checked.
 pub(super) struct Checker<'a> {
     pub path: &'a Path,
@@ -41,9 +37,6 @@ impl Checker<'_> {
     /// # Errors
     /// At the value that cannot be read.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
-        if let Some((key, what)) = GONE.into_iter().find(|(key, _)| self.has(key)) {
-            return Err(self.at(key, what));
-        }
         let root = DeTable::parse(self.text);
         if let Ok(root) = &root {
             let lists = |path: &str| list(root.get_ref(), path.split('.'));

@@ -3,36 +3,50 @@
 use super::check::Checker;
 use super::value::{KEY, Range, defaults, positive, share};
 use super::{ProxySpec, SceneError};
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, Deserializer, Error, IgnoredAny};
 
 /// What [`Algorithm::Rest`] took the place of; datasets of it are still read.
 const LINEARISED: &str = "linearised";
 
 /// Equation (2) and how it is solved.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSpec {
     /// Contact stiffness: of one spring Kc between a proxy node and an object node; the energy form's stiffness at a
     /// contact point is kc = 3 Kc (three nodes of a triangle). Infinity is rigid contact. Where the scene gives a
     /// stiffness per length instead, that of a node that stands for the mean length; [`ContactSpec::node_stiffness`]
     /// gives each node's own (N/m).
-    #[serde(default, deserialize_with = "number_or_rigid")]
     pub stiffness: f64,
     /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that (N/m^2).
-    #[serde(default, deserialize_with = "positive")]
     pub stiffness_per_length: Option<f64>,
     /// How equation (2) is solved.
-    #[serde(default, deserialize_with = "algorithm")]
     pub algorithm: Algorithm,
     /// Relative residual at which a configuration counts as converged (1).
-    #[serde(default = "tolerance", deserialize_with = "share")]
     pub tolerance: f64,
     /// After as many a configuration that has not converged is flagged.
-    #[serde(default = "max_iterations", deserialize_with = "at_least_one")]
     pub max_iterations: u32,
     /// Which surface the proxy feels.
-    #[serde(default)]
     pub surface: ContactSurface,
+}
+
+/// `[contact]` as it is written.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ContactTable {
+    #[serde(default, deserialize_with = "number_or_rigid")]
+    stiffness: f64,
+    #[serde(default, deserialize_with = "positive")]
+    stiffness_per_length: Option<f64>,
+    /// `None` where it is one that is no more.
+    #[serde(default = "default_algorithm", deserialize_with = "algorithm")]
+    pub algorithm: Option<Algorithm>,
+    #[serde(default = "tolerance", deserialize_with = "share")]
+    tolerance: f64,
+    #[serde(default = "max_iterations", deserialize_with = "at_least_one")]
+    max_iterations: u32,
+    #[serde(default)]
+    surface: ContactSurface,
+    /// Of an algorithm that is no more.
+    updates: Option<IgnoredAny>,
 }
 
 /// Which surface of a mesh the proxy feels.
@@ -112,20 +126,20 @@ fn at_least_one<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
     }
 }
 
-/// Reads how contact is solved, by its name.
-fn algorithm<'de, D: Deserializer<'de>>(value: D) -> Result<Algorithm, D::Error> {
+fn default_algorithm() -> Option<Algorithm> {
+    Some(Algorithm::default())
+}
+
+/// Reads how contact is solved, by its name; `None` for [`LINEARISED`].
+fn algorithm<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Algorithm>, D::Error> {
     let name = String::deserialize(value)?;
     let known = <Algorithm as clap::ValueEnum>::value_variants();
-    known.iter().copied().find(|known| known.name() == name).ok_or_else(|| {
-        let names: Vec<String> = known.iter().map(|known| format!("`{}`", known.name())).collect();
-        D::Error::custom(if name == LINEARISED {
-            format!(
-                "the algorithm {LINEARISED:?} is no more, its torque was not the gradient of its energy: take \"rest\""
-            )
-        } else {
-            format!("unknown algorithm {name:?}: take one of {}", names.join(", "))
-        })
-    })
+    let found = known.iter().copied().find(|known| known.name() == name);
+    if found.is_some() || name == LINEARISED {
+        return Ok(found);
+    }
+    let names: Vec<String> = known.iter().map(|known| format!("`{}`", known.name())).collect();
+    Err(D::Error::custom(format!("unknown algorithm {name:?}: take one of {}", names.join(", "))))
 }
 
 /// Reads a stiffness: a positive number, or `"rigid"` for infinity.
@@ -133,12 +147,21 @@ fn number_or_rigid<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error>
     Range::Positive.number_or("rigid", value)
 }
 
-impl ContactSpec {
+impl ContactTable {
     /// Checks it against the arm, and gives the surface and the stiffness that it leaves out.
-    pub(super) fn check(&mut self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<(), SceneError> {
+    pub fn check(self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<ContactSpec, SceneError> {
         let nodes = || proxy.joints.iter().flat_map(|joint| &joint.nodes);
         let error = |key: &str, message: &str| Err(checker.at(&format!("contact.{key}"), message));
-        match (self.stiffness > 0.0, self.stiffness_per_length) {
+        if self.updates.is_some() {
+            return error("updates", "updates acted on the algorithm \"linearised\", which is no more: leave it out");
+        }
+        let Some(algorithm) = self.algorithm else {
+            let message = "the algorithm \"linearised\" is no more, its torque was not the gradient of its energy: take \
+                           \"rest\"";
+            return error("algorithm", message);
+        };
+        let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, mut surface, .. } = self;
+        match (stiffness > 0.0, stiffness_per_length) {
             (true, None) => {}
             (true, Some(_)) => {
                 let message = "contact has a stiffness of each node and one per length: leave out one of them";
@@ -151,7 +174,7 @@ impl ContactSpec {
             }
             (false, Some(per_length)) => {
                 let length: f64 = nodes().map(|node| node.length).sum();
-                self.stiffness = per_length * (length / nodes().count() as f64) / 3.0;
+                stiffness = per_length * (length / nodes().count() as f64) / 3.0;
             }
             (false, None) => {
                 let message = "contact has no stiffness: add stiffness [N/m] of each node, or \"rigid\", or \
@@ -159,22 +182,20 @@ impl ContactSpec {
                 return error("stiffness", message);
             }
         }
-        match (self.surface, self.algorithm) {
+        match (surface, algorithm) {
             (ContactSurface::Smooth, Algorithm::Paper) if checker.has("contact.surface") => {
                 let message =
                     "the algorithm \"paper\" is defined on the triangles: leave surface out, or take \"energy\"";
-                error("surface", message)
+                return error("surface", message);
             }
-            (ContactSurface::Smooth, Algorithm::Paper) => {
-                self.surface = ContactSurface::Facets;
-                Ok(())
-            }
+            (ContactSurface::Smooth, Algorithm::Paper) => surface = ContactSurface::Facets,
             (ContactSurface::Facets, Algorithm::Energy | Algorithm::Rest) if nodes().any(|node| node.radius > 0.0) => {
                 let message = "nodes with a radius do not balance where the closest triangle changes: leave surface \
                                out, and they touch the smooth surface";
-                error("surface", message)
+                return error("surface", message);
             }
-            _ => Ok(()),
+            _ => {}
         }
+        Ok(ContactSpec { stiffness, stiffness_per_length, algorithm, tolerance, max_iterations, surface })
     }
 }

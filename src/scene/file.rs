@@ -1,14 +1,15 @@
 //! The tables of a scene file, and what holds between them.
 
 use super::check::Checker;
+use super::contact::ContactTable;
 use super::graphics::GraphicsEntry;
 use super::grid::GridTable;
 use super::object::ObjectTable;
 use super::proxy::ProxyTable;
 use super::scan::ScanTable;
 use super::{
-    Algorithm, ContactSpec, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene,
-    Scene, SceneError, shape,
+    Algorithm, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
+    SceneError, shape,
 };
 use crate::names;
 use serde::Deserialize;
@@ -21,7 +22,7 @@ pub(super) struct SceneTable {
     pub name: Option<String>,
     pub object: Option<ObjectTable>,
     pub proxy: ProxyTable,
-    pub contact: Option<ContactSpec>,
+    pub contact: Option<ContactTable>,
     pub grid: Option<GridTable>,
     pub scan: Option<ScanTable>,
     #[serde(default)]
@@ -36,14 +37,14 @@ pub(super) struct SceneTable {
 /// Validates `table`, read from the checker's text, as a scene with a virtual object.
 pub(super) fn scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<Scene, SceneError> {
     let rendering = rendering(checker, &mut table)?;
-    let (Some(object), Some(mut contact)) = (rendering.object, table.contact) else {
+    let (Some(object), Some(contact)) = (rendering.object, table.contact) else {
         let message = "the scene needs [object] and [contact] to be baked; a scene of a real object, with [scan], is \
                        haptized by `haptize scan`";
         return Err(checker.error(0..0, message));
     };
     let Rendering { path, text, name, proxy, haptics, graphics, motion, .. } = rendering;
     let grid = table.grid.map(|grid| grid.check(checker, "grid", &proxy.joints)).transpose()?.unwrap_or_default();
-    contact.check(checker, &proxy)?;
+    let contact = contact.check(checker, &proxy)?;
     Ok(Scene { path, text, name, object, contact, grid, haptics, graphics, motion, proxy })
 }
 
@@ -77,7 +78,7 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     let mut haptics = take(&mut table.haptics);
     // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
     // energy.
-    let solved = table.contact.is_some_and(|contact| contact.algorithm != Algorithm::Paper);
+    let solved = table.contact.as_ref().is_some_and(|contact| contact.algorithm != Some(Algorithm::Paper));
     if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
         haptics.interpolation = Interpolation::Linear;
     }

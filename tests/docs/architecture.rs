@@ -15,7 +15,6 @@ const ALL: &str = "all above";
 const SHARED_NAMES: &[&str] = &[
     "Arguments",
     "Body",
-    "Bound",
     "Camera",
     "Colour",
     "Column",
@@ -24,10 +23,8 @@ const SHARED_NAMES: &[&str] = &[
     "Cost",
     "Course",
     "Explored",
-    "Failure",
     "Files",
     "Frame",
-    "Geometry",
     "Interpolation",
     "Joint",
     "Kernel",
