@@ -151,7 +151,7 @@ fn nothing_is_written_to_devices_and_pipes() {
     assert!(
         ["device", "device.png", "o/cspace.png", "o/table.json"].iter().all(|name| irregular(&home.path().join(name)))
     );
-    assert_eq!(names(&home.path().join("o")).len(), 8);
+    assert_eq!(names(&home.path().join("o")).len(), 7);
 }
 
 /// Twice into one folder: every file of the first run must be one that the second knows, and replaces.
