@@ -316,13 +316,14 @@ fn the_first_deadline_comes_after_the_system_has_granted_what_it_grants() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut late, .. }) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
+    let (mut body, _ends) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
     // As long as memory may take to be locked.
     std::thread::sleep(Duration::from_millis(200));
     body.begin();
     body.tick();
     // A busy machine makes the tick late, too, by far less.
-    assert!(!late.pop().is_ok_and(|tick| tick.by > Duration::from_millis(150)));
+    let lateness = body.lateness();
+    assert!(lateness.count == 1 && lateness.max < 150e3, "{lateness:?}");
 }
 
 /// Friction and contact damping as the tests feel them.

@@ -10,7 +10,6 @@ use crate::{
         realtime::{self, Options},
         session::{self, Plan},
         setup::{Setup, labels},
-        steal::Steal,
         timing::{Percentiles, Timing},
         trace::{Summary, Tick, TickTable, Trace},
     },
@@ -185,32 +184,27 @@ pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
     line("lateness", timing.lateness)?;
     line("tick", timing.tick_cost)?;
     line("frame", timing.frame_cost)?;
-    let Timing { missed_deadlines, missed_frames, unrecorded, .. } = timing;
+    let Timing { missed_deadlines, missed_frames, unrecorded, late, .. } = timing;
     writeln!(
         text,
         "  missed       {missed_deadlines} deadlines (ticks left out because an earlier one ran late), \
          {missed_frames} frames, {unrecorded} records"
     )?;
-    let Some(Steal { late, late_beside_steal, seconds }) = timing.steal.filter(|steal| steal.late > 0) else {
+    if *late == 0 {
         return Ok(());
+    }
+    // Who has the priority already is not told to give it.
+    let remedy = if timing.refused.is_empty() {
+        "give the loop an idle core"
+    } else {
+        "give the loop real-time priority (haptize doctor) or an idle core"
     };
-    write!(text, "  late         {late} ticks by more than half a period")?;
-    if late_beside_steal > 0 {
+    write!(text, "  late         {late} ticks by more than half a period: {remedy}")?;
+    if let Some(seconds) = timing.stolen.filter(|seconds| *seconds > 0.0) {
         write!(
             text,
-            ", {late_beside_steal} of them while the hypervisor took the processor ({seconds:.2} s in all): give the \
-             virtual machine processors of its own"
+            "; the hypervisor took {seconds:.2} s from this virtual machine meanwhile: give it processors of its own"
         )?;
-    }
-    if late > late_beside_steal {
-        let own = late - late_beside_steal;
-        // Who has the priority already is not told to give it.
-        let remedy = if timing.refused.is_empty() {
-            "give the loop an idle core"
-        } else {
-            "give the loop real-time priority (haptize doctor) or an idle core"
-        };
-        write!(text, "; {own} by this system: {remedy}")?;
     }
     writeln!(text)
 }

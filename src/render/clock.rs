@@ -40,9 +40,13 @@ pub fn ask_for_real_time() -> Vec<String> {
     refused
 }
 
-/// The counters of stolen time, processor by processor; empty where the system has none.
-pub fn stolen() -> Vec<u64> {
-    std::fs::read_to_string("/proc/stat").map(|text| super::steal::counters(&text)).unwrap_or_default()
+/// Time that the hypervisor has taken from the processors of this virtual machine since its start (s), in steps of a
+/// hundredth; `None` where the system does not count it.
+pub fn stolen() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/stat").ok()?;
+    // Of all processors together: user, nice, system, idle, iowait, irq, softirq, steal.
+    let steps: f64 = text.lines().next()?.split_ascii_whitespace().nth(8)?.parse().ok()?;
+    Some(steps / counter_rate())
 }
 
 #[cfg(target_os = "linux")]
@@ -51,7 +55,7 @@ mod system {
         mm::{MlockAllFlags, mlockall, munlockall},
         param::clock_ticks_per_second,
         process::getpriority_process,
-        thread::{clock_nanosleep_absolute, sched_getcpu},
+        thread::clock_nanosleep_absolute,
         time::{ClockId, Timespec, clock_gettime},
     };
     use std::{io, time::Duration};
@@ -100,10 +104,6 @@ mod system {
         Ok(mlockall(MlockAllFlags::CURRENT)?)
     }
 
-    pub fn processor() -> usize {
-        sched_getcpu()
-    }
-
     pub fn counter_rate() -> f64 {
         clock_ticks_per_second() as f64
     }
@@ -138,10 +138,6 @@ mod system {
 
     pub fn take_short_turns() {}
 
-    pub fn processor() -> usize {
-        0
-    }
-
     pub fn counter_rate() -> f64 {
         100.0
     }
@@ -153,5 +149,5 @@ mod system {
     pub fn unlock_memory() {}
 }
 
-pub use system::{counter_rate, now, processor, raise_priority, sleep_until, unlock_memory};
-use system::{lock_memory, take_short_turns};
+use system::{counter_rate, lock_memory, take_short_turns};
+pub use system::{now, raise_priority, sleep_until, unlock_memory};

@@ -25,7 +25,6 @@ pub mod realtime;
 pub mod recording;
 pub mod session;
 pub mod setup;
-pub mod steal;
 pub mod timing;
 mod torque_history;
 pub mod trace;

@@ -11,7 +11,6 @@ use super::{
     haptic::Haptics,
     live::Live,
     session::{Driver, Frames, Latest, Plan, SessionError},
-    steal::{LateTick, StealObserver},
     timing::{Durations, Percentiles, Timing},
     trace::{Frame, Tick, Trace},
 };
@@ -27,9 +26,6 @@ use std::{
 
 /// Ticks that the ring to the recorder holds: sixteen seconds at 1 kHz. A window at rest reads them once a minute.
 const RING: usize = 1 << 14;
-
-/// Late ticks that the ring to the recorder holds.
-const LATE_RING: usize = 1024;
 
 /// How long the graphics thread sleeps at most before it looks whether the session is over.
 const LONGEST_SLEEP: Duration = Duration::from_millis(20);
@@ -49,7 +45,6 @@ pub struct HapticLoop<'session> {
     driver: Driver<'session>,
     recorder: rtrb::Producer<Tick>,
     latest: triple_buffer::Input<Latest>,
-    late: rtrb::Producer<LateTick>,
     lateness: Durations,
     interval: Durations,
     cost: Durations,
@@ -60,6 +55,8 @@ pub struct HapticLoop<'session> {
     /// Number of the next deadline.
     next: u64,
     missed: u64,
+    /// Ticks that began more than half a period late.
+    late: u64,
     unrecorded: u64,
     clear: Arc<AtomicBool>,
     /// Whether the device has stopped for good.
@@ -72,8 +69,6 @@ pub struct Ends {
     pub ticks: rtrb::Consumer<Tick>,
     /// The latest tick.
     pub latest: triple_buffer::Output<Latest>,
-    /// Ticks that began more than half a period late.
-    pub late: rtrb::Consumer<LateTick>,
     /// Clears a fault.
     pub clear: ClearFault,
 }
@@ -109,7 +104,6 @@ impl<'session> HapticLoop<'session> {
         }
         let driver = Driver::new(haptics, device, live)?;
         let (recorder, ticks) = rtrb::RingBuffer::new(RING);
-        let (late, late_ticks) = rtrb::RingBuffer::new(LATE_RING);
         let start = crate::JointVector::zeros(haptics.joints());
         let (latest, reader) =
             triple_buffer::triple_buffer(&Latest { time: -1.0, proxy: start, device: start, share: 0.0 });
@@ -119,7 +113,6 @@ impl<'session> HapticLoop<'session> {
             driver,
             recorder,
             latest,
-            late,
             lateness: histogram()?,
             interval: histogram()?,
             cost: histogram()?,
@@ -128,11 +121,12 @@ impl<'session> HapticLoop<'session> {
             last: None,
             next: 0,
             missed: 0,
+            late: 0,
             unrecorded: 0,
             clear: Arc::clone(&clear),
             stopped: false,
         };
-        Ok((this, Ends { ticks, latest: reader, late: late_ticks, clear: ClearFault(clear) }))
+        Ok((this, Ends { ticks, latest: reader, clear: ClearFault(clear) }))
     }
 
     /// Asks the system for a real-time priority for the calling thread, and sets the first deadline to now. Returns
@@ -189,6 +183,12 @@ impl<'session> HapticLoop<'session> {
         self.tick_at(now, deadline, false);
     }
 
+    /// From deadline to beginning of the ticks so far.
+    #[must_use]
+    pub fn lateness(&self) -> Percentiles {
+        self.lateness.percentiles()
+    }
+
     /// Ticks against the clock, or as `scheduler` calls, while `goes_on`. Returns what the system refused or what
     /// stopped the scheduler.
     fn pace(&mut self, scheduler: Option<Arc<dyn Scheduler>>, goes_on: impl Fn(&Self) -> bool + Sync) -> Vec<String> {
@@ -219,10 +219,7 @@ impl<'session> HapticLoop<'session> {
         let begun = clock::now();
         let by = now - deadline;
         self.lateness.record(by);
-        if by > self.period / 2 {
-            // A full ring holds enough late ticks to tell what makes them late.
-            let _ = self.late.push(LateTick { at: now, by, processor: clock::processor() });
-        }
+        self.late += u64::from(by > self.period / 2);
         // The next deadline that is at least half a period away.
         let behind = (now + self.period / 2).saturating_sub(self.deadline(self.next + 1));
         let skipped = behind.as_nanos().div_ceil(self.period.as_nanos().max(1)) as u64;
@@ -296,7 +293,7 @@ pub fn run(
 ) -> Result<(Trace, Timing), SessionError> {
     let Options { stop, live, mut on_tick } = options;
     let scheduler = device.scheduler();
-    let (mut body, Ends { mut ticks, latest, mut late, .. }) = HapticLoop::new(haptics, device, live)?;
+    let (mut body, Ends { mut ticks, latest, .. }) = HapticLoop::new(haptics, device, live)?;
     let start = *body.driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
     let mut recorded = plan.new_ticks()?;
@@ -314,7 +311,7 @@ pub fn run(
         let feeling = thread::Builder::new().name("haptic".into()).spawn_scoped(scope, move || {
             let goes_on = |body: &HapticLoop<'_>| !body.is_over(plan.ticks) && !stop.load(Ordering::Relaxed);
             let refused = body.pace(scheduler, goes_on);
-            (refused, body.lateness, body.interval, body.cost, body.missed, body.unrecorded)
+            (refused, body.lateness, body.interval, body.cost, [body.missed, body.late, body.unrecorded])
         });
         let feeling = match feeling {
             Ok(thread) => thread,
@@ -323,7 +320,7 @@ pub fn run(
                 return Err(resources(error));
             }
         };
-        let mut observer = StealObserver::new(clock::now(), clock::stolen(), clock::counter_rate());
+        let stolen_before = clock::stolen();
         loop {
             let last = feeling.is_finished();
             while let Ok(tick) = ticks.pop() {
@@ -332,10 +329,6 @@ pub fn run(
                 }
                 recorded.push(tick);
             }
-            while let Ok(tick) = late.pop() {
-                observer.add(tick);
-            }
-            observer.read(clock::now(), clock::stolen());
             if last {
                 break;
             }
@@ -345,7 +338,7 @@ pub fn run(
         let felt = feeling.join().map_err(|_| SessionError::Thread("haptic"))?;
         let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
         clock::unlock_memory();
-        let (refused, lateness, interval, cost, missed_deadlines, unrecorded) = felt;
+        let (refused, lateness, interval, cost, [missed_deadlines, late, unrecorded]) = felt;
         let Drawn { frames, shown, cost: frame_cost, missed: missed_frames } = drawn.unwrap_or_default();
         let timing = Timing {
             refused,
@@ -356,7 +349,8 @@ pub fn run(
             frame_cost,
             missed_deadlines,
             missed_frames,
-            steal: observer.finish(),
+            late,
+            stolen: clock::stolen().zip(stolen_before).map(|(after, before)| after - before),
             unrecorded,
         };
         Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing))

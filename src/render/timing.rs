@@ -1,6 +1,5 @@
 //! How punctual a real-time session was: histograms of lateness and cost, filled without allocation.
 
-use super::steal::Steal;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 use std::time::Duration;
@@ -62,8 +61,11 @@ pub struct Timing {
     pub missed_deadlines: u64,
     /// Frames that began more than a frame late.
     pub missed_frames: u64,
-    /// Late ticks, and what of them the hypervisor is to blame for; absent where the system does not count that.
-    pub steal: Option<Steal>,
+    /// Ticks that began more than half a period late.
+    pub late: u64,
+    /// Time that the hypervisor took from all processors meanwhile, which makes ticks late (s); absent where the system
+    /// does not count it.
+    pub stolen: Option<f64>,
     /// Ticks that ran but could not be recorded, because the recorder fell behind.
     pub unrecorded: u64,
 }
