@@ -143,7 +143,10 @@ fn an_effect_that_cannot_act_is_refused_with_its_line() {
     for (spec, expected) in [
         ("[haptics.friction]\nstiffness = 1.0", "coefficient"),
         ("[haptics.friction]\ncoefficient = -0.1", "coefficient is -0.1: it must be positive"),
-        ("[haptics]\nfour_channel = { channels = [0.0, 1.0, 1.0, 1.5] }", "channels is 1.5: it must be between 0 and 1"),
+        (
+            "[haptics]\nfour_channel = { channels = [0.0, 1.0, 1.0, 1.5] }",
+            "channels is 1.5: it must be between 0 and 1",
+        ),
     ] {
         let message = Rendering::parse(&super::block::scene(spec), "scene").unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
