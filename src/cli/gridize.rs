@@ -227,7 +227,9 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
     let Some(log) = arguments.logs.first().filter(|log| is_mcap(log)) else {
         // A recording of another kind says what to do.
         for log in &arguments.logs {
-            input::open(log).map_err(|error| format!("{}: cannot be read: {error}", log.display()))?;
+            input::open(log).map_err(|error| {
+                format!("{}: cannot be read: {error}; check the path and its permissions", log.display())
+            })?;
         }
         return if topic.is_some() {
             Err("--topic is of MCAP files, and the first log is none".into())
