@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     MAX_JOINTS,
+    csv::TableError,
     dataset::Dataset,
     gridize::{GridizeOptions, GridizeReport, Interpolation, Samples, gridize},
     input,
@@ -227,9 +228,8 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
     let Some(log) = arguments.logs.first().filter(|log| is_mcap(log)) else {
         // A recording of another kind says what to do.
         for log in &arguments.logs {
-            input::open(log).map_err(|error| {
-                format!("{}: cannot be read: {error}; check the path and its permissions", log.display())
-            })?;
+            let unreadable = |source| TableError::Read { file: log.clone(), source };
+            input::open(log).map_err(unreadable)?;
         }
         return if topic.is_some() {
             Err("--topic is of MCAP files, and the first log is none".into())
