@@ -110,6 +110,9 @@ impl Exploring {
         if played.is_ok() || self.on_demand.blocks() > before {
             self.on_demand.save(self.file.as_path())?;
         }
+        if let Some(notice) = self.on_demand.notice() {
+            tell(format_args!("haptize: {notice}"));
+        }
         played
     }
 

@@ -13,14 +13,14 @@ use crate::{
     sweep::{
         CpuBackend, NoEnergy, SceneObjectError,
         ahead::{Ahead, Follower, Solution, Solved, Whereabouts, follow},
-        build_object, check_algorithm, grid_of, order_of, sample,
+        build_object, check_algorithm, grid_of, order_of, sample, thin_parts,
     },
 };
 use std::{
     io,
     path::{Path, PathBuf},
     sync::{
-        Arc,
+        Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
@@ -45,6 +45,8 @@ pub struct OnDemand {
     threads: usize,
     /// Blocks that an earlier session left.
     known: u64,
+    /// What to tell of what was explored, once a session is over.
+    notice: OnceLock<String>,
 }
 
 /// A scene cannot be solved while it is felt.
@@ -143,7 +145,8 @@ impl OnDemand {
         store.reserve(known as usize + ROOM);
         let processors = thread::available_parallelism().map_or(1, usize::from);
         let threads = threads.unwrap_or_else(|| processors.saturating_sub(1).max(1));
-        Ok(Self { scene, object, chain, store: Arc::new(store), grid, provenance, threads, known })
+        let (store, notice) = (Arc::new(store), OnceLock::new());
+        Ok(Self { scene, object, chain, store, grid, provenance, threads, known, notice })
     }
 
     /// The scene.
@@ -158,12 +161,23 @@ impl OnDemand {
         self.store.horizon()
     }
 
+    /// Returns what the session that is over tells of the object, as a sentence without its full stop.
+    #[must_use]
+    pub fn notice(&self) -> Option<&str> {
+        self.notice.get().map(String::as_str)
+    }
+
+    /// How what is known was made.
+    fn provenance(&self) -> Provenance {
+        Provenance { notices: self.notice.get().cloned().into_iter().collect(), ..self.provenance.clone() }
+    }
+
     /// Returns everything known so far, as a dataset.
     #[must_use]
     pub fn dataset(&self) -> Dataset {
         let surface = Some(Surface::of(&self.object));
         let (grid, text) = (self.grid.clone(), self.scene.text.clone());
-        Dataset::refined(Arc::clone(&self.store), grid, surface, text, self.provenance.clone())
+        Dataset::refined(Arc::clone(&self.store), grid, surface, text, self.provenance())
     }
 
     /// Writes everything known so far to `file`, as a dataset. Nothing is made at the points of the grid: the memory
@@ -173,7 +187,7 @@ impl OnDemand {
     /// As [`Dataset::save`].
     pub fn save(&self, file: &Path) -> Result<(), DatasetError> {
         let surface = Surface::of(&self.object);
-        self.store.save(&self.grid, Some(&surface), &self.scene.text, &self.provenance, file)
+        self.store.save(&self.grid, Some(&surface), &self.scene.text, &self.provenance(), file)
     }
 
     /// Begins to solve around `start` and wherever the loop then goes that has the [`Live`]. Returns once the levels
@@ -208,6 +222,10 @@ impl OnDemand {
             let ahead = Ahead::new(&model, Arc::clone(&this.store));
             ahead.prepare(&start, this.threads, LONGEST_START.saturating_sub(began.elapsed()));
             ends.serve(&model, &ahead, &raised, &report);
+            if let Some(notice) = thin_parts::of_store(&model, &this.store) {
+                // The window begins again and again: the first session that sees it tells it.
+                let _ = this.notice.set(notice);
+            }
             Done { solved: ahead.solved(), full: ahead.is_full() }
         };
         let thread = thread::Builder::new().name("explorer".into()).spawn(work)?;

@@ -13,10 +13,11 @@
 use super::{
     lowest,
     table::{PointResult, Table},
+    thin_parts,
 };
 use crate::{
     JointVector,
-    contact::{Model, PastMiddle, Proximity, Solvers, Status},
+    contact::{Model, Solvers, Status},
     dataset::{Dataset, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
@@ -139,33 +140,11 @@ impl ErrorCheck<'_> {
             torque: (squares / exact.len().max(1) as f64).sqrt(),
             errors: errors.collect::<Result<_, FieldError>>()?,
         };
-        Ok(Some(Measured { error, notice: self.pushed_through(grid, &places) }))
-    }
-
-    /// Returns what to tell where the arm gets past the middle of a part of the object between one of `places` and the
-    /// corners of its cell.
-    fn pushed_through(&self, grid: &Grid, places: &[Place]) -> Option<String> {
-        let passed: Vec<(PastMiddle, &Place)> = places
-            .par_iter()
-            .map_init(
-                || Proximity::new(self.model),
-                |proximity, place| {
-                    let reached = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
-                    Some((proximity.past_middle(&place.q, reached)?, place))
-                },
-            )
-            .flatten()
-            .collect();
-        let (thinnest, place) = passed.iter().min_by(|(a, _), (b, _)| a.thickness.total_cmp(&b.thickness))?;
-        Some(format!(
-            "near {} of {} random configurations in contact the arm passes the middle of a part of the object, {:.1} \
-             mm thick at its thinnest, at q = [{}]: contact is with the closest surface, so the torque changes its sign \
-             in the middle and is zero beyond the part: shorten the ranges of the joints, or make the part thicker",
-            passed.len(),
-            places.len(),
-            1e3 * thinnest.thickness,
-            place.q.iter().map(|q| format!("{q:.4}")).collect::<Vec<_>>().join(", ")
-        ))
+        let cells = places.par_iter().map(|place| {
+            let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
+            (place.q, corners.collect())
+        });
+        Ok(Some(Measured { error, notice: thin_parts::notice(self.model, cells) }))
     }
 }
 

@@ -32,6 +32,7 @@ mod sharded;
 pub(crate) mod spacing;
 mod table;
 mod tally;
+pub(crate) mod thin_parts;
 
 pub use crate::contact::Backend;
 pub use bake::{Bake, BakeError, SceneObjectError, baked, build_object, sample};

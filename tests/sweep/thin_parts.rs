@@ -8,8 +8,9 @@ const PLATE: &str = "v -0.02 -0.02 -0.001\nv 0.02 -0.02 -0.001\nv -0.02 0.02 -0.
     v -0.02 -0.02 0.001\nv 0.02 -0.02 0.001\nv -0.02 0.02 0.001\nv 0.02 0.02 0.001\n\
     f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 
-/// Pins pressed upwards into the plate, from 5 mm below its middle to `last` (m) beyond it, in steps of `step` (m).
-fn told(last: f64, step: f64) -> String {
+/// Pins pressed upwards into the plate, from 5 mm below its middle to `last` (m) beyond it, on a grid of this `step` (m),
+/// haptized by the command `arguments`. Returns what command and file tell of thin parts; both tell the same.
+fn told(last: f64, step: f64, arguments: &[&str]) -> String {
     let folder = Folder::new();
     std::fs::write(folder.0.path().join("plate.obj"), PLATE).unwrap();
     let scene = format!(
@@ -20,31 +21,42 @@ fn told(last: f64, step: f64) -> String {
          [[grid.axes]]\nstart = -0.005\nstop = {last}\nstep = {step}\n"
     );
     std::fs::write(folder.0.path().join("plate.toml"), scene).unwrap();
-    let mut bake = Command::new(env!("CARGO_BIN_EXE_haptize"));
-    bake.current_dir(folder.0.path()).args(["bake", "plate.toml", "--backend", "cpu", "--json"]);
-    let output = bake.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    // The file tells it as well as the bake does.
-    let info = Command::new(env!("CARGO_BIN_EXE_haptize"))
-        .current_dir(folder.0.path())
-        .args(["info", "plate.haptize"])
-        .output()
-        .unwrap();
-    let kept = String::from_utf8_lossy(&info.stdout).into_owned();
-    let warned = report["warnings"].as_array().unwrap().iter().map(|told| told.as_str().unwrap());
-    let warned: Vec<&str> = warned.filter(|told| told.contains("the middle of a part")).collect();
-    assert_eq!(kept.contains("the middle of a part"), !warned.is_empty(), "{kept}");
-    warned.concat()
+    std::fs::write(folder.0.path().join("motion.csv"), format!("time,press\n0,-0.004\n0.3,{last}\n")).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_haptize"));
+        let output = command.current_dir(folder.0.path()).args(arguments).output().unwrap();
+        let [told, errors] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+        assert!(output.status.success(), "{arguments:?}: {errors}");
+        told + &errors
+    };
+    let sentence = |text: &str| {
+        let begin = text.find("near ").filter(|_| text.contains("the middle of a part"));
+        begin.map_or(String::new(), |begin| text[begin..].split(": shorten").next().unwrap().to_owned())
+    };
+    let [told, kept] = [arguments, &["info", "plate.haptize"]].map(|arguments| sentence(&run(arguments)));
+    assert_eq!(told, kept, "{arguments:?}");
+    told
 }
 
 #[test]
 fn it_is_told_with_the_thickness_when_the_arm_passes_the_middle_of_a_thin_part_in_small_steps_or_in_great_ones() {
+    let bake = ["bake", "plate.toml", "--backend", "cpu", "--json"];
     // Through the plate; past its middle; and from below it to above it within one step.
     for (last, step) in [(0.005, 0.0005), (0.0005, 0.0005), (0.0028, 0.0026)] {
-        let told = told(last, step);
+        let told = told(last, step, &bake);
         assert!(told.contains(", 2.0 mm thick") && told.contains("at q = ["), "{last}, {step}: {told:?}");
     }
     // To 0.1 mm below the middle.
-    assert_eq!(told(-0.0001, 0.0007), "");
+    assert_eq!(told(-0.0001, 0.0007, &bake), "");
+}
+
+#[test]
+fn a_refined_dataset_and_one_that_is_solved_on_demand_tell_it_too() {
+    let refined = ["bake", "plate.toml", "--backend", "cpu", "--max-error", "60%", "--refine", "2"];
+    let on_demand = ["play", "plate.toml", "--on-demand", "plate.haptize", "--motion", "motion.csv"];
+    for arguments in [&refined[..], &on_demand] {
+        let told_of = told(0.005, 0.0005, arguments);
+        assert!(told_of.contains(", 2.0 mm thick") && told_of.contains("at q = ["), "{arguments:?}: {told_of:?}");
+        assert_eq!(told(-0.0001, 0.0007, arguments), "", "{arguments:?}");
+    }
 }

@@ -30,6 +30,7 @@ use super::{
     lowest::applies,
     node::Scale,
     reference::{REFERENCE_TOLERANCE, tight},
+    thin_parts,
 };
 use crate::{
     JointVector,
@@ -89,7 +90,8 @@ pub struct Refined {
     pub rounds: usize,
     /// Result of the search for lower equilibria, of all nodes solved; absent if there was none.
     pub lowered: Option<Lowered>,
-    /// Notices of the backend; nodes are counted from zero in the order in which they were solved.
+    /// Notices of the backend, whose nodes are counted from zero in the order in which they were solved, and of thin
+    /// parts of the object.
     pub notices: Vec<String>,
 }
 
@@ -136,7 +138,9 @@ impl Refine<'_> {
                 if lowest {
                     unseen.lower(&solvers, &filling.book.nodes);
                 }
-                return Ok(filling.report(store, mean.sqrt() / seen.torque(), rounds));
+                let mut refined = filling.report(store, mean.sqrt() / seen.torque(), rounds);
+                refined.notices.extend(thin_parts::of_store(self.model, &refined.store));
+                return Ok(refined);
             }
             filling.refine(&store, aim / (mean * reserve))?;
         }
