@@ -144,6 +144,10 @@ impl Work for Counted<'_> {
         Some(chunk)
     }
 
+    fn rewind(&mut self) {
+        self.work.rewind();
+    }
+
     fn take(&mut self, equilibria: Vec<Equilibrium>) {
         self.out -= 1;
         if self.out == 0 {

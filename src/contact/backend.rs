@@ -50,6 +50,9 @@ pub trait Work {
     /// The next chunk; `None` when there is none or it is not wanted any more, and from then on.
     fn next(&mut self) -> Option<Vec<JointVector>>;
 
+    /// Gives the chunks that have no equilibria once more, from the earliest on: the backend that had them has failed.
+    fn rewind(&mut self);
+
     /// Takes the equilibria of the earliest chunk that has none.
     fn take(&mut self, equilibria: Vec<Equilibrium>);
 

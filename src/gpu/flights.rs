@@ -454,6 +454,8 @@ mod tests {
             Some(chunk.collect())
         }
 
+        fn rewind(&mut self) {}
+
         fn take(&mut self, equilibria: Vec<Equilibrium>) {
             self.under_way -= 1;
             self.taken.push(equilibria.iter().map(|equilibrium| equilibrium.gap).collect());

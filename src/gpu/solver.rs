@@ -232,6 +232,9 @@ impl Work for OneChunk {
         self.configurations.take()
     }
 
+    /// There is no other backend for it.
+    fn rewind(&mut self) {}
+
     fn take(&mut self, equilibria: Vec<Equilibrium>) {
         self.equilibria = equilibria;
     }

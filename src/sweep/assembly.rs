@@ -8,8 +8,10 @@ use super::{
 use crate::dataset::{
     self, Heading, RESULTS, Stored, Surface, Target, Tensor, TensorContents, surface_tensors, write_file,
 };
+use bytemuck::Pod;
 use rayon::prelude::*;
 use std::{
+    collections::TryReserveError,
     io::{self, Write},
     ops::Range,
     sync::atomic::{AtomicBool, Ordering},
@@ -72,15 +74,33 @@ impl<'a> Results<'a> {
         &self.rows[usize::from(ends == Stored::TouchOffsets)]
     }
 
+    /// A column of all points, that of the ends of rows behind a 0, in memory; an error where there is none.
+    pub fn column<T: Pod>(&self, array: Stored) -> Result<Vec<T>, TryReserveError> {
+        let mut numbers = Vec::new();
+        numbers.try_reserve_exact(self.bytes(array) / size_of::<T>())?;
+        numbers.resize(self.bytes(array) / size_of::<T>(), T::zeroed());
+        let mut rest = bytemuck::cast_slice_mut(&mut numbers);
+        let contents = Contents::Results(self, array);
+        for piece in 0..self.points.div_ceil(PIECE) {
+            // What is written is as long as the column.
+            let _ = contents.write(piece, &mut rest);
+        }
+        Ok(numbers)
+    }
+
+    /// Bytes of a column in the file.
+    fn bytes(&self, array: Stored) -> usize {
+        let entries = match array.ends() {
+            Some(ends) => self.before(ends).last().copied().unwrap_or(0),
+            None => self.points + usize::from(is_ends(array)),
+        };
+        entries * self.size(array)
+    }
+
     /// Writes all points as the dataset `output`.
     pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), dataset::Error> {
-        let tensor = |array: Stored| {
-            let entries = match array.ends() {
-                Some(ends) => self.before(ends).last().copied().unwrap_or(0),
-                None => self.points + usize::from(is_ends(array)),
-            };
-            Tensor::stored(array, heading.grid, entries * self.size(array), Contents::Results(self, array))
-        };
+        let tensor =
+            |array: Stored| Tensor::stored(array, heading.grid, self.bytes(array), Contents::Results(self, array));
         let stored = RESULTS.into_iter().filter(|array| self.shape.has(array.ends().unwrap_or(*array)));
         let mut tensors: Vec<_> = stored.map(tensor).collect();
         tensors.extend(surface_tensors(heading.grid, surface).into_iter().map(|tensor| tensor.map(Contents::Held)));

@@ -2,12 +2,8 @@
 //! are kept, by a thread of its own: checksums and the file wait for no solver, and no solver for them.
 
 use super::{
-    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError,
-    columns::{Columns, Width},
-    free_space::FreeGaps,
-    part::Part,
-    report::RunFacts,
-    tally::Tally,
+    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError, columns::Columns, free_space::FreeGaps,
+    part::Part, report::RunFacts, table::Block, tally::Tally,
 };
 use crate::{
     JointVector,
@@ -36,8 +32,8 @@ pub(super) const BEHIND: usize = 2;
 
 /// Where a sweep's results go as they come.
 pub(super) trait Store: Send {
-    /// Adds a chunk whose first point has number `first`.
-    fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError>;
+    /// Adds a chunk whose first point has number `first`, and leaves columns for another.
+    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), SweepError>;
     /// Adds something that provenance will tell.
     fn note(&mut self, notice: &str) -> Result<(), SweepError>;
     /// Returns where an interrupted sweep continues from.
@@ -45,8 +41,8 @@ pub(super) trait Store: Send {
 }
 
 impl Store for Part {
-    fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError> {
-        Part::append(self, first, chunk)
+    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), SweepError> {
+        Part::append(self, &Block::of(chunk, first))
     }
     fn note(&mut self, notice: &str) -> Result<(), SweepError> {
         Part::note(self, notice)
@@ -56,17 +52,11 @@ impl Store for Part {
     }
 }
 
-/// In memory, with room for all points.
-impl Store for Columns {
-    fn append(&mut self, _first: usize, chunk: &Columns) -> Result<(), SweepError> {
-        let points = self.status.capacity();
-        let each = |numbers: usize| numbers / chunk.points().max(1);
-        let (tangent, touches) = (!chunk.tangent.is_empty(), !chunk.touches.ends.is_empty());
-        let width = Width { joints: each(chunk.torque.len()), tangent, touches };
-        let [contacts, touches] = [(&self.contacts, &chunk.contacts), (&self.touches, &chunk.touches)]
-            .map(|(rows, more)| rows.nodes.len() + more.nodes.len());
-        let bytes = Columns::size(points, width, contacts, touches);
-        self.append(chunk).map_err(|source| SweepError::Memory { points, bytes, source })
+/// In memory: chunks by the number of their first point.
+impl Store for Vec<(usize, Columns)> {
+    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), SweepError> {
+        self.push((first, std::mem::take(chunk)));
+        Ok(())
     }
     fn note(&mut self, _notice: &str) -> Result<(), SweepError> {
         Ok(())
@@ -76,7 +66,7 @@ impl Store for Columns {
     }
 }
 
-/// Memory of a store.
+/// What is sent to a store.
 #[expect(clippy::large_enum_variant, reason = "a few at a time; a box would be memory for every chunk")]
 enum Entry {
     /// Results of the points from this number on.
@@ -88,8 +78,8 @@ enum Entry {
 /// others.
 fn keep(store: &mut dyn Store, entries: Receiver<Entry>, room: SyncSender<Columns>) -> Result<(), SweepError> {
     entries.into_iter().try_for_each(|entry| match entry {
-        Entry::Chunk(first, columns) => {
-            store.append(first, &columns)?;
+        Entry::Chunk(first, mut columns) => {
+            store.append(first, &mut columns)?;
             // Where no other chunk follows nobody needs it.
             let _ = room.send(columns);
             Ok(())
@@ -174,6 +164,18 @@ struct Chunk {
     free_gaps: Vec<Option<f32>>,
 }
 
+impl Chunk {
+    /// The gap of a point that is known to be free (m).
+    fn free_gap(&self, point: usize) -> Option<f32> {
+        self.free_gaps.get(point - self.points.start).copied().flatten()
+    }
+
+    /// The points that are solved.
+    fn solved(&self) -> impl Iterator<Item = usize> {
+        self.points.clone().filter(|&point| self.free_gap(point).is_none())
+    }
+}
+
 impl Sweep<'_> {
     /// Solves the points that `begun` lacks.
     pub(super) fn solve<B: Backend>(
@@ -217,6 +219,7 @@ impl Sweep<'_> {
             gaps: None,
             cut: resumed,
             chunks: VecDeque::new(),
+            given: 0,
             size: ChunkSize::new(run.chunk.clamp(1, self.points().max(1))),
             run,
             tally,
@@ -262,8 +265,10 @@ struct Course<'c, 'r> {
     gaps: Option<FreeGaps>,
     /// Number of points that were cut off the sweep's so far.
     cut: usize,
-    /// Chunks that were given to the backend and have no results yet.
+    /// Chunks that have no results yet.
     chunks: VecDeque<Chunk>,
+    /// How many of them the backend has.
+    given: usize,
     size: ChunkSize,
     tally: Tally,
     provenance: Provenance,
@@ -320,45 +325,46 @@ impl Course<'_, '_> {
     }
 
     /// Cuts off the next points, so many that at most [`ChunkSize::size`] of them are to be solved.
-    fn cut_chunk(&mut self) -> (Chunk, Vec<JointVector>) {
+    fn cut_chunk(&mut self) -> Chunk {
         let (rest, most) = (self.rest(), self.size.size);
-        let (mut configurations, mut free_gaps) = (Vec::new(), Vec::new());
+        let (mut solved, mut free_gaps) = (0, Vec::new());
         let end = rest.end.min(rest.start.saturating_add(together(most)));
         let end = if self.free_space.is_some() { end.min(self.slab.end) } else { end };
         let mut point = rest.start;
         while point < end {
             let free_gap = self.gaps.as_ref().and_then(|gaps| gaps.gap(point));
             if free_gap.is_none() {
-                if configurations.len() == most {
+                if solved == most {
                     break;
                 }
-                configurations.push(self.sweep.grid.configuration(point));
+                solved += 1;
             }
             if self.gaps.is_some() {
                 free_gaps.push(free_gap);
             }
             point += 1;
         }
-        (Chunk { points: rest.start..point, free_gaps }, configurations)
+        self.cut += point - rest.start;
+        Chunk { points: rest.start..point, free_gaps }
     }
 
     /// Keeps the results of a chunk.
     fn keep(&mut self, chunk: &Chunk, equilibria: &[Equilibrium]) -> Result<(), SweepError> {
-        let solved = chunk.points.len() - chunk.free_gaps.iter().flatten().count();
+        let solved = chunk.solved().count();
         if equilibria.len() != solved {
             return Err(SweepError::Miscount { asked: solved, found: equilibria.len() });
         }
         let mut columns = self.kept.columns().ok_or_else(|| self.stopped())?;
         let shape = self.sweep.shape;
         let mut equilibria = equilibria.iter();
-        for place in 0..chunk.points.len() {
-            match chunk.free_gaps.get(place).copied().flatten() {
+        for point in chunk.points.clone() {
+            match chunk.free_gap(point) {
                 Some(gap) => columns.push_free(gap, shape),
                 None => equilibria.next().into_iter().for_each(|solved| columns.push(solved, shape)),
             }
         }
-        self.skipped += columns.points() - solved;
-        self.tally.add(&columns);
+        self.skipped += chunk.points.len() - solved;
+        self.tally.add(&Block::of(&columns, chunk.points.start));
         self.kept.send(Entry::Chunk(chunk.points.start, columns)).ok_or_else(|| self.stopped())?;
         self.size.adapt(solved, self.taken.elapsed());
         self.taken = Instant::now();
@@ -387,22 +393,32 @@ impl Course<'_, '_> {
 
 impl Work for Course<'_, '_> {
     fn next(&mut self) -> Option<Vec<JointVector>> {
-        let is_over = self.cut >= self.sweep.points() || self.run.stop.load(Ordering::Relaxed);
-        if is_over || self.failure.is_some() {
+        if self.failure.is_some() {
             return None;
         }
-        if let Err(failure) = self.look_for_free_space() {
-            self.failure = Some(failure);
-            return None;
+        if self.given == self.chunks.len() {
+            if self.cut >= self.sweep.points() || self.run.stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            if let Err(failure) = self.look_for_free_space() {
+                self.failure = Some(failure);
+                return None;
+            }
+            let chunk = self.cut_chunk();
+            self.chunks.push_back(chunk);
         }
-        let (chunk, configurations) = self.cut_chunk();
-        self.cut += chunk.points.len();
-        self.chunks.push_back(chunk);
-        Some(configurations)
+        let chunk = self.chunks.get(self.given)?;
+        self.given += 1;
+        Some(chunk.solved().map(|point| self.sweep.grid.configuration(point)).collect())
+    }
+
+    fn rewind(&mut self) {
+        self.given = 0;
     }
 
     fn take(&mut self, equilibria: Vec<Equilibrium>) {
         let Some(chunk) = self.chunks.pop_front() else { return };
+        self.given = self.given.saturating_sub(1);
         if self.failure.is_none() {
             self.failure = self.keep(&chunk, &equilibria).err();
         }

@@ -201,6 +201,8 @@ mod tests {
             self.torques.extend(equilibria.into_iter().map(|equilibrium| equilibrium.torque));
         }
 
+        fn rewind(&mut self) {}
+
         fn note(&mut self, _: String) {}
     }
 

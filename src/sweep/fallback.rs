@@ -10,7 +10,7 @@ use crate::{
     JointVector,
     contact::{Equilibrium, Model, Work},
 };
-use std::{collections::VecDeque, fmt::Display};
+use std::fmt::Display;
 
 /// A backend with the CPU behind it.
 pub struct WithFallback<'a, B> {
@@ -35,49 +35,6 @@ impl<'a, B: Backend> WithFallback<'a, B> {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
-    }
-}
-
-/// Some work, of which the chunks that have no equilibria are remembered.
-struct Remembered<'w> {
-    work: &'w mut dyn Work,
-    under_way: VecDeque<Vec<JointVector>>,
-}
-
-impl Work for Remembered<'_> {
-    fn next(&mut self) -> Option<Vec<JointVector>> {
-        let chunk = self.work.next()?;
-        self.under_way.push_back(chunk.clone());
-        Some(chunk)
-    }
-
-    fn take(&mut self, equilibria: Vec<Equilibrium>) {
-        self.under_way.pop_front();
-        self.work.take(equilibria);
-    }
-
-    fn note(&mut self, notice: String) {
-        self.work.note(notice);
-    }
-}
-
-/// The chunks of some work that a device has left behind, and then the others.
-struct Resumed<'w> {
-    work: &'w mut dyn Work,
-    left_behind: VecDeque<Vec<JointVector>>,
-}
-
-impl Work for Resumed<'_> {
-    fn next(&mut self) -> Option<Vec<JointVector>> {
-        self.left_behind.pop_front().or_else(|| self.work.next())
-    }
-
-    fn take(&mut self, equilibria: Vec<Equilibrium>) {
-        self.work.take(equilibria);
-    }
-
-    fn note(&mut self, notice: String) {
-        self.work.note(notice);
     }
 }
 
@@ -113,19 +70,15 @@ impl<B: Backend> Backend for WithFallback<'_, B> {
     }
 
     fn stream(&mut self, work: &mut dyn Work) -> Result<(), Self::Error> {
-        let mut left_behind = VecDeque::new();
         if let Some(device) = &mut self.device {
-            let mut remembered = Remembered { work: &mut *work, under_way: VecDeque::new() };
-            match device.stream(&mut remembered) {
+            match device.stream(work) {
                 Ok(()) => return Ok(()),
-                Err(error) => {
-                    left_behind = remembered.under_way;
-                    self.leave(&error);
-                }
+                Err(error) => self.leave(&error),
             }
+            work.rewind();
         }
         self.notices().into_iter().for_each(|notice| work.note(notice));
-        self.cpu()?.stream(&mut Resumed { work, left_behind }).map_err(|never| match never {})
+        self.cpu()?.stream(work).map_err(|never| match never {})
     }
 
     fn notices(&mut self) -> Vec<String> {

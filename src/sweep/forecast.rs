@@ -5,7 +5,7 @@
 
 use super::{
     Backend, Sweep,
-    columns::{Columns, Shape},
+    columns::{self, Shape},
 };
 use crate::random::Random;
 use serde::Serialize;
@@ -101,7 +101,7 @@ impl Sweep<'_> {
         let bytes = |shape: Shape| {
             let [contacts, touches] = [(contacts, shape.with_forces), (touches, shape.with_touches)]
                 .map(|(rows, is_stored)| if is_stored { (per_sample * rows as f64).round() as usize } else { 0 });
-            Columns::size(points, shape.width(), contacts, touches)
+            columns::size(points, shape.width(), contacts, touches)
         };
         self.forecast = Some(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,

@@ -7,7 +7,7 @@ use super::{
     Backend, ChosenBackend, Footprint, Forecast, FreeSpace, SweepError, SweepReport,
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
-    columns::{Columns, Rows, Shape},
+    columns::{Columns, Shape},
     footprint::{self, Bounds},
     lowest,
     measured::{ErrorCheck, MOST_CONFIGURATIONS},
@@ -18,12 +18,13 @@ use super::{
 };
 use crate::{
     contact::{MeshRipple, Model},
-    dataset::{self, Axis, Contacts, Dataset, Grid, Heading, Provenance, Surface, Target},
+    dataset::{self, Axis, CONTACTS, Contacts, Dataset, Grid, Heading, Provenance, Stored, Surface, TOUCHES, Target},
     memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
 };
 use std::{
+    collections::TryReserveError,
     ffi::OsString,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
@@ -253,7 +254,8 @@ impl<'a> Sweep<'a> {
         let results = |touching| footprint::results(points, touching, self.shape);
         let memory = |touching| {
             let chunk = footprint::chunk(solved, together, touching, self.shape).saturating_add(slab);
-            chunk.saturating_add(if in_memory { results(touching) } else { assembly::buffers() })
+            // In memory as they were solved, and once more as columns.
+            chunk.saturating_add(if in_memory { results(touching).saturating_mul(2) } else { assembly::buffers() })
         };
         // A shard holds the forces from which lower equilibria are searched for.
         let with_forces = self.with_forces || (self.shard != Shard::WHOLE && self.shape.with_forces);
@@ -282,18 +284,18 @@ impl<'a> Sweep<'a> {
         let footprint = self.footprint(run.chunk, true);
         let (points, bytes) = (self.grid.points(), footprint.memory.least);
         memory::check(bytes).map_err(|shortage| SweepError::Shortage { points, shortage })?;
-        let mut columns = Columns::with_room(points, self.shape.width()).map_err(|source| SweepError::Memory {
-            points,
-            bytes,
-            source,
-        })?;
+        let mut chunks: Vec<(usize, Columns)> = Vec::new();
         let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut columns)?;
-        let mut table = Table::new(self.shape.width(), vec![Block::of(&columns, 0)]);
+        let solved = self.solve(backend, &mut run, begun, footprint, &mut chunks)?;
+        let blocks = chunks.iter().map(|(first, columns)| Block::of(columns, *first)).collect();
+        let mut table = Table::new(self.shape.width(), blocks);
         let (report, provenance) = self.complete(solved, &mut table, run.stop, None)?;
-        let replaced = std::mem::take(&mut table.replaced);
-        columns.replace(0, &replaced).map_err(|source| SweepError::Memory { points, bytes, source })?;
-        Ok((self.dataset(columns, provenance), report))
+        let shape = Shape { with_forces: self.with_forces, ..self.shape };
+        // Nothing stops it halfway.
+        let never = AtomicBool::new(false);
+        let results = Results::new(&table, points, shape, &never);
+        let dataset = self.dataset(&results, provenance);
+        Ok((dataset.map_err(|source| SweepError::Memory { points, bytes, source })?, report))
     }
 
     /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it
@@ -344,7 +346,7 @@ impl<'a> Sweep<'a> {
         let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
         let failed = |source| SweepError::Part { path: kept_in.clone(), source };
         let map = part.map().map_err(failed)?;
-        let mut table = part.table(&map, self.shape.width()).map_err(failed)?;
+        let mut table = part.table(&map, self.shape.width())?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let shape = Shape { with_forces: self.with_forces, ..self.shape };
@@ -420,28 +422,30 @@ impl<'a> Sweep<'a> {
         self.model.map(|model| FreeSpace::new(model, &self.grid))
     }
 
-    fn dataset(&self, columns: Columns, provenance: Provenance) -> Dataset {
-        let contacts = |rows: Rows| Contacts {
-            offsets: std::iter::once(0).chain(rows.ends).collect::<Vec<u64>>().into(),
-            nodes: rows.nodes.into(),
-            forces: rows.forces.into(),
+    fn dataset(&self, results: &Results<'_>, provenance: Provenance) -> Result<Dataset, TryReserveError> {
+        let contacts = |[offsets, nodes, forces]: [Stored; 3]| -> Result<Contacts, TryReserveError> {
+            Ok(Contacts {
+                offsets: results.column(offsets)?.into(),
+                nodes: results.column(nodes)?.into(),
+                forces: results.column(forces)?.into(),
+            })
         };
-        Dataset {
+        Ok(Dataset {
             grid: self.grid.clone(),
-            torque: columns.torque.into(),
-            energy: Some(columns.energy.into()),
-            tangent: self.shape.with_tangent.then(|| columns.tangent.into()),
-            gap: Some(columns.gap.into()),
-            status: columns.status.into(),
-            residual: Some(columns.residual.into()),
-            iterations: Some(columns.iterations.into()),
-            contacts: self.with_forces.then(|| contacts(columns.contacts)),
-            touches: self.shape.with_touches.then(|| contacts(columns.touches)),
+            torque: results.column(Stored::Torque)?.into(),
+            energy: Some(results.column(Stored::Energy)?.into()),
+            tangent: self.shape.with_tangent.then(|| results.column(Stored::Tangent)).transpose()?.map(Into::into),
+            gap: Some(results.column(Stored::Gap)?.into()),
+            status: results.column(Stored::Status)?.into(),
+            residual: Some(results.column(Stored::Residual)?.into()),
+            iterations: Some(results.column(Stored::Iterations)?.into()),
+            contacts: self.with_forces.then(|| contacts(CONTACTS)).transpose()?,
+            touches: self.shape.with_touches.then(|| contacts(TOUCHES)).transpose()?,
             surface: Some(self.surface.clone()),
             refinement: None,
             scene: self.scene.clone(),
             provenance,
-        }
+        })
     }
 }
 

@@ -8,10 +8,10 @@ use super::{
     Backend, Progress, Run, SceneObjectError, Shard, SweepError, SweepReport,
     bake::{model_of, sweep_of},
     build_object,
-    columns::Columns,
     grid_sweep::Sweep,
-    part::{self, Binding, Frame, Part},
+    part::{Binding, Found, Part},
     shard::{EXTENSION, ranges},
+    table::Block,
 };
 use crate::{
     JointVector,
@@ -27,7 +27,6 @@ use std::{
     collections::BTreeMap,
     convert::Infallible,
     fs, io,
-    ops::Range,
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
 };
@@ -36,12 +35,7 @@ use std::{
 pub(super) struct Contents {
     path: PathBuf,
     map: Mmap,
-    binding: Binding,
-    /// First point of each block of points, and its place in the file.
-    blocks: Vec<(usize, Range<usize>)>,
-    notices: Vec<String>,
-    /// Whether all points of the shard are there, and nothing is damaged.
-    is_whole: bool,
+    found: Found,
 }
 
 impl Contents {
@@ -52,35 +46,30 @@ impl Contents {
         // SAFETY: the mapping is read-only, and a shard that has its name is not written to any more. Another program
         // that truncates it ends this process, as it would with any mapped file; no haptic loop reads it.
         let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
-        let foreign = |reason: &str| SweepError::ForeignPart { path: path.into(), reason: reason.into() };
-        let (binding, mut place) = part::binding(&map).map_err(|reason| foreign(&reason))?;
-        binding.grid.check().map_err(|reason| foreign(&reason))?;
-        binding.shard.check().map_err(|reason| foreign(&reason))?;
-        let (mut blocks, mut notices, mut done) = (Vec::new(), Vec::new(), 0);
-        let (points, width) = (binding.grid.points(), binding.width());
-        while let Some((frame, body)) = part::next(&map, &mut place) {
-            match frame {
-                Frame::Notice(text) => notices.push(text),
-                Frame::Block => {
-                    let rest = binding.shard.rest(points, done);
-                    let block = map.get(body.clone()).and_then(|block| Columns::decode(block, rest.start, width));
-                    let Some(block) = block.filter(|block| block.points() <= rest.len()) else { break };
-                    blocks.push((rest.start, body));
-                    done += block.points();
-                }
-            }
+        let found = Found::read(&map).and_then(|found| found.ok_or_else(|| "its beginning is damaged".into()));
+        match found {
+            Ok(found) => Ok(Self { path: path.into(), map, found }),
+            Err(reason) => Err(SweepError::ForeignPart { path: path.into(), reason }),
         }
-        let is_whole = place == map.len() && done == binding.points();
-        Ok(Self { path: path.into(), map, binding, blocks, notices, is_whole })
+    }
+
+    /// Everything on which its results depend.
+    fn binding(&self) -> &Binding {
+        &self.found.binding
+    }
+
+    /// Whether all points of the shard are there, and nothing is damaged.
+    fn is_whole(&self) -> bool {
+        self.found.is_whole(&self.map)
     }
 
     /// Whether this is the whole shard that `binding` is of.
     pub fn is_whole_of(&self, binding: &Binding) -> Result<bool, SweepError> {
-        let different =
-            binding.other_sweep(&self.binding).or((binding.shard != self.binding.shard).then_some("another shard"));
+        let its = self.binding();
+        let different = binding.other_sweep(its).or((binding.shard != its.shard).then_some("another shard"));
         match different {
             Some(difference) => Err(SweepError::OtherPart { path: self.path.clone(), difference }),
-            None => Ok(self.is_whole),
+            None => Ok(self.is_whole()),
         }
     }
 }
@@ -197,15 +186,15 @@ impl Merge {
         let (mut shards, mut notes, mut first) = (BTreeMap::<usize, Contents>::new(), Vec::new(), None);
         for file in files(paths)? {
             let found = Contents::read(&file)?;
-            let (path, binding) = first.get_or_insert_with(|| (file.clone(), found.binding.clone()));
-            let is_other = binding.shard.count != found.binding.shard.count;
+            let (path, binding) = first.get_or_insert_with(|| (file.clone(), found.binding().clone()));
+            let is_other = binding.shard.count != found.binding().shard.count;
             if let Some(difference) =
-                binding.other_sweep(&found.binding).or(is_other.then_some("another number of shards"))
+                binding.other_sweep(found.binding()).or(is_other.then_some("another number of shards"))
             {
                 return Err(MergeError::Different { path: file, other: path.clone(), difference });
             }
-            let Shard { index, .. } = found.binding.shard;
-            if !found.is_whole {
+            let Shard { index, .. } = found.binding().shard;
+            if !found.is_whole() {
                 notes.push(format!("{} is damaged: shard {index} counts as missing", file.display()));
             } else if let Some(kept) = shards.get(&index) {
                 notes.push(format!("shard {index} is there twice: {} is taken", kept.path.display()));
@@ -247,8 +236,8 @@ impl Merge {
         let Some(first) = self.shards.values().next().filter(|_| missing.is_empty()) else {
             return Err(MergeError::Missing { missing: ranges(&missing), count: self.count });
         };
-        let mut binding = first.binding.clone();
-        let dates = self.shards.values().map(|shard| shard.binding.provenance.date.clone());
+        let mut binding = first.binding().clone();
+        let dates = self.shards.values().map(|shard| shard.binding().provenance.date.clone());
         binding.provenance.date = dates.min().unwrap_or_default();
         let mut scene = Scene::parse(&binding.scene, &binding.scene_path)?;
         if let Ok(algorithm) = Algorithm::from_str(&binding.provenance.algorithm, true) {
@@ -271,21 +260,18 @@ impl Merge {
     /// Copies what a part of `output` lacks into it.
     fn copy(&self, sweep: &Sweep<'_>, output: &Path) -> Result<(), SweepError> {
         let path = Sweep::part_of(output);
-        let failed = |source| SweepError::Part { path: path.clone(), source };
         let mut binding = sweep.binding();
         let (mut part, tally) = Part::open(&path, true, &mut binding)?;
-        let mut blocks: Vec<(usize, &[u8])> = Vec::new();
-        for shard in self.shards.values() {
-            blocks.extend(shard.blocks.iter().map(|(first, body)| (*first, &shard.map[body.clone()])));
-        }
-        blocks.sort_unstable_by_key(|(first, _)| *first);
-        let begin = blocks.partition_point(|(first, _)| *first < tally.points);
-        let next = blocks.get(begin).map_or(binding.points(), |(first, _)| *first);
+        let mut blocks: Vec<Block<'_>> =
+            self.shards.values().flat_map(|shard| shard.found.blocks(&shard.map)).collect();
+        blocks.sort_unstable_by_key(|block| block.first);
+        let begin = blocks.partition_point(|block| block.first < tally.points);
+        let next = blocks.get(begin).map_or(binding.points(), |block| block.first);
         if next != tally.points {
             return Err(SweepError::Unfinished { path });
         }
-        for (_, block) in &blocks[begin..] {
-            part.write(&[block]).map_err(failed)?;
+        for block in &blocks[begin..] {
+            part.append(block)?;
         }
         for notice in self.notices().get(binding.provenance.notices.len()..).unwrap_or_default() {
             part.note(notice)?;
@@ -298,14 +284,14 @@ impl Merge {
     fn notices(&self) -> Vec<String> {
         let mut solved_by = BTreeMap::<_, Vec<usize>>::new();
         for (&index, shard) in &self.shards {
-            let by = &shard.binding.provenance;
+            let by = &shard.binding().provenance;
             solved_by.entry((&by.backend, &by.adapter)).or_default().push(index);
         }
         let others =
             solved_by.into_iter().filter(|(_, shards)| !shards.contains(&0)).map(|((backend, adapter), shards)| {
                 format!("shards {} of {} were solved on {backend} ({adapter})", ranges(&shards), self.count)
             });
-        others.chain(self.shards.values().flat_map(|shard| shard.notices.clone())).collect()
+        others.chain(self.shards.values().flat_map(|shard| shard.found.notices.clone())).collect()
     }
 }
 

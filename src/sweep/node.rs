@@ -151,10 +151,11 @@ pub(super) fn solve_all<B: Backend>(
 
 /// Configurations of nodes on their way through a backend, and their equilibria.
 struct Batches<'a> {
-    /// Those that the backend does not have yet, so many at a time.
-    left: std::slice::Chunks<'a, (usize, JointVector)>,
     /// Number of a node, and a configuration of it.
     all: &'a [(usize, JointVector)],
+    /// How many the backend is given at a time, and how many it was given.
+    batch: usize,
+    given: usize,
     solved: Vec<Equilibrium>,
     note: &'a mut dyn FnMut(usize, String),
 }
@@ -166,7 +167,7 @@ impl<'a> Batches<'a> {
         all: &'a [(usize, JointVector)],
         note: &'a mut dyn FnMut(usize, String),
     ) -> Result<Vec<Equilibrium>, B::Error> {
-        let mut work = Self { left: all.chunks(batch.max(1)), all, solved: Vec::with_capacity(all.len()), note };
+        let mut work = Self { all, batch, given: 0, solved: Vec::with_capacity(all.len()), note };
         backend.stream(&mut work)?;
         Ok(work.solved)
     }
@@ -174,7 +175,13 @@ impl<'a> Batches<'a> {
 
 impl Work for Batches<'_> {
     fn next(&mut self) -> Option<Vec<JointVector>> {
-        self.left.next().map(|batch| batch.iter().map(|(_, q)| *q).collect())
+        let batch = self.all[self.given..].chunks(self.batch.max(1)).next()?;
+        self.given += batch.len();
+        Some(batch.iter().map(|(_, q)| *q).collect())
+    }
+
+    fn rewind(&mut self) {
+        self.given = self.solved.len();
     }
 
     fn take(&mut self, equilibria: Vec<Equilibrium>) {

@@ -4,14 +4,14 @@
 //! "haptize part 5\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
-//! The first body is the [`Binding`] as JSON, every other one a block of [`Columns`], or [`NOTICE`] and a text. Frames
+//! The first body is the [`Binding`] as JSON, every other one a [`Block`] of results, or [`NOTICE`] and a text. Frames
 //! are only ever appended. What a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed
 //! again: a part never adds a wrong number to a dataset, and the finished file is the same, bit for bit, as without the
 //! interruption.
 
 use super::{
     Shard, SweepError,
-    columns::{Columns, Opening, Width},
+    columns::Width,
     shard,
     table::{Block, Table},
     tally::Tally,
@@ -21,15 +21,12 @@ use memmap2::Mmap;
 use serde::{Deserialize, Serialize};
 use std::{
     fs::{File, OpenOptions, TryLockError},
-    io::{self, BufReader, Read, Seek, SeekFrom, Write},
+    io::{self, Seek, SeekFrom, Write},
     ops::Range,
     path::{Path, PathBuf},
 };
 
 const MAGIC: &[u8] = b"haptize part 5\n";
-/// Length and checksum before each body (bytes).
-const FRAME: usize = 8 + 4;
-
 /// How the body of a notice begins: as no block of columns does, whose first point has no such number.
 const NOTICE: [u8; 8] = [u8::MAX; 8];
 
@@ -108,8 +105,66 @@ impl Binding {
 pub(super) struct Part {
     path: PathBuf,
     file: File,
-    /// Where the frame behind the binding begins (bytes).
-    results: u64,
+}
+
+/// What the bytes of a part hold, as far as they are whole.
+pub(super) struct Found {
+    pub binding: Binding,
+    /// Where the blocks of results lie, in the order of the points (bytes).
+    blocks: Vec<Range<usize>>,
+    pub notices: Vec<String>,
+    pub tally: Tally,
+    /// Where the frame behind the binding begins, and where the last whole frame ends (bytes).
+    results: usize,
+    end: usize,
+}
+
+impl Found {
+    /// Reads the part in `bytes`; `None` where it ends before its binding does. `Err` says why it is none.
+    pub fn read(bytes: &[u8]) -> Result<Option<Self>, String> {
+        if !bytes.starts_with(MAGIC) {
+            // Killed while it wrote its first line.
+            return if MAGIC.starts_with(bytes) {
+                Ok(None)
+            } else {
+                Err("it is no part of a bake by this version".into())
+            };
+        }
+        let Some(body) = frame(bytes, MAGIC.len()) else { return Ok(None) };
+        let (results, blocks) = (body.end, Vec::new());
+        let binding: Binding = serde_json::from_slice(&bytes[body]).map_err(|error| error.to_string())?;
+        binding.grid.check()?;
+        binding.shard.check()?;
+        let (points, width) = (binding.grid.points(), binding.width());
+        let (notices, tally) = (Vec::new(), Tally::default());
+        let mut found = Self { binding, blocks, notices, tally, results, end: results };
+        while let Some(body) = frame(bytes, found.end) {
+            let contents = &bytes[body.clone()];
+            found.end = if let Some(notice) = contents.strip_prefix(&NOTICE) {
+                found.notices.push(String::from_utf8_lossy(notice).into_owned());
+                body.end
+            } else {
+                let next = found.binding.shard.rest(points, found.tally.points);
+                let is_next = |block: &Block<'_>| block.first == next.start && block.points() <= next.len();
+                let Some(block) = Block::read(contents, width).filter(is_next) else { break };
+                found.tally.add(&block);
+                found.blocks.push(body.clone());
+                body.end
+            };
+        }
+        Ok(Some(found))
+    }
+
+    /// The blocks of results in `bytes`, from which this was read.
+    pub fn blocks<'m>(&self, bytes: &'m [u8]) -> impl Iterator<Item = Block<'m>> {
+        let width = self.binding.width();
+        self.blocks.iter().filter_map(move |body| Block::read(&bytes[body.clone()], width))
+    }
+
+    /// Whether all points are there, and nothing of `bytes` is damaged.
+    pub fn is_whole(&self, bytes: &[u8]) -> bool {
+        self.end == bytes.len() && self.tally.points == self.binding.points()
+    }
 }
 
 impl Part {
@@ -132,22 +187,49 @@ impl Part {
             // Some network file systems have no locks; only the second of two bakes at once would notice.
             Err(TryLockError::Error(_)) => (),
         }
-        let mut part = Self { path: path.into(), file, results: 0 };
-        if !resume && part.holds_results()? {
-            return Err(SweepError::Unfinished { path: path.into() });
-        }
-        let found = if resume { part.read(binding)? } else { None };
-        match found {
-            Some(tally) => Ok((part, tally)),
-            None => part.begin(binding).map(|()| (part, Tally::default())).map_err(failed),
-        }
+        let mut part = Self { path: path.into(), file };
+        let map = part.map().map_err(failed)?;
+        let (tally, end) = match part.found(&map)? {
+            Some(found) if !resume && found.results < map.len() => {
+                return Err(SweepError::Unfinished { path: path.into() });
+            }
+            Some(found) if resume => {
+                if let Some(difference) = found.binding.difference(binding) {
+                    return Err(SweepError::OtherPart { path: path.into(), difference });
+                }
+                binding.provenance.date = found.binding.provenance.date;
+                binding.provenance.notices.extend(found.notices);
+                (found.tally, Some(found.end))
+            }
+            _ => (Tally::default(), None),
+        };
+        drop(map);
+        part.stand(end, binding).map_err(failed)?;
+        Ok((part, tally))
     }
 
-    /// Adds a chunk whose first point has number `first`.
-    pub fn append(&mut self, first: usize, chunk: &Columns) -> Result<(), SweepError> {
-        let opening = chunk.opening(first);
-        let mut body = vec![opening.as_flattened()];
-        body.extend(chunk.bytes());
+    /// Stands behind the first `end` bytes, which are whole, and cuts off the others; or begins anew.
+    fn stand(&mut self, end: Option<usize>, binding: &Binding) -> io::Result<()> {
+        let length = end.unwrap_or(0) as u64;
+        self.file.set_len(length)?;
+        self.file.seek(SeekFrom::Start(length))?;
+        if end.is_none() {
+            self.file.write_all(MAGIC)?;
+            self.write(&[&serde_json::to_vec(binding)?])?;
+        }
+        Ok(())
+    }
+
+    /// What is in `map`, which is of this part; `None` where it ends before its binding does.
+    fn found(&self, map: &Mmap) -> Result<Option<Found>, SweepError> {
+        Found::read(map).map_err(|reason| SweepError::ForeignPart { path: self.path.clone(), reason })
+    }
+
+    /// Adds the results of the next points.
+    pub fn append(&mut self, block: &Block<'_>) -> Result<(), SweepError> {
+        let opening = block.opening();
+        let mut body = vec![&opening[..]];
+        body.extend(block.columns);
         self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })
     }
 
@@ -175,17 +257,8 @@ impl Part {
         &self.path
     }
 
-    fn begin(&mut self, binding: &Binding) -> io::Result<()> {
-        self.file.set_len(0)?;
-        self.file.rewind()?;
-        self.file.write_all(MAGIC)?;
-        self.write(&[&serde_json::to_vec(binding)?])?;
-        self.results = self.file.stream_position()?;
-        Ok(())
-    }
-
     /// Appends a frame whose body comes in pieces.
-    pub fn write(&mut self, body: &[&[u8]]) -> io::Result<()> {
+    fn write(&mut self, body: &[&[u8]]) -> io::Result<()> {
         let length: usize = body.iter().map(|piece| piece.len()).sum();
         let mut hasher = crc32fast::Hasher::new();
         body.iter().for_each(|piece| hasher.update(piece));
@@ -200,146 +273,18 @@ impl Part {
         unsafe { Mmap::map(&self.file) }
     }
 
-    /// The results in `map`, which is of this part, and all of whose frames are whole.
-    pub fn table<'m>(&self, map: &'m Mmap, width: Width) -> io::Result<Table<'m>> {
-        let (mut blocks, mut rest) = (Vec::new(), map.get(self.results as usize..).unwrap_or(&[]));
-        while !rest.is_empty() {
-            let (length, behind) = rest.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
-            let length = usize::try_from(u64::from_le_bytes(*length)).map_err(io::Error::other)?;
-            let (body, behind) = behind[FRAME - 8..].split_at_checked(length).ok_or(io::ErrorKind::UnexpectedEof)?;
-            rest = behind;
-            if !body.starts_with(&NOTICE) {
-                let (opening, columns) = body.split_first_chunk().ok_or(io::ErrorKind::UnexpectedEof)?;
-                let opening = Opening::of(*opening).ok_or(io::ErrorKind::InvalidData)?;
-                blocks.push(Block { first: opening.first, columns: opening.columns(columns, width) });
-            }
-        }
+    /// The results in `map`, which is of this part.
+    pub fn table<'m>(&self, map: &'m Mmap, width: Width) -> Result<Table<'m>, SweepError> {
+        let blocks = self.found(map)?.map_or_else(Vec::new, |found| found.blocks(map).collect());
         Ok(Table::new(width, blocks))
     }
-
-    /// The binding of the file that is there, which `reader` then stands behind with `left` bytes left; `None` when the
-    /// file ends before its binding does.
-    fn opening(&self, reader: &mut impl Read, left: &mut u64) -> Result<Option<Binding>, SweepError> {
-        let failed = |source| SweepError::Part { path: self.path.clone(), source };
-        let mut magic = Vec::new();
-        reader.take(MAGIC.len() as u64).read_to_end(&mut magic).map_err(failed)?;
-        if magic != MAGIC {
-            // Killed while it wrote its first line; anything else is not ours to overwrite.
-            return if MAGIC.starts_with(&magic) { Ok(None) } else { Err(self.foreign("it is no part of a bake")) };
-        }
-        *left -= MAGIC.len() as u64;
-        let Some(body) = frame(reader, left).map_err(failed)? else { return Ok(None) };
-        serde_json::from_slice(&body).map(Some).map_err(|error| self.foreign(&error.to_string()))
-    }
-
-    /// Whether there is anything behind the binding.
-    fn holds_results(&self) -> Result<bool, SweepError> {
-        let mut left = self.length()?;
-        Ok(self.opening(&mut BufReader::new(&self.file), &mut left)?.is_some() && left > 0)
-    }
-
-    /// (bytes)
-    fn length(&self) -> Result<u64, SweepError> {
-        let metadata = self.file.metadata().map_err(|source| SweepError::Part { path: self.path.clone(), source })?;
-        Ok(metadata.len())
-    }
-
-    /// Reads the part from its start, cuts off what is not whole, and leaves the file there; `None` when nothing is.
-    fn read(&mut self, binding: &mut Binding) -> Result<Option<Tally>, SweepError> {
-        let failed = |source| SweepError::Part { path: self.path.clone(), source };
-        let length = self.length()?;
-        let mut left = length;
-        let mut reader = BufReader::new(&self.file);
-        let Some(found) = self.opening(&mut reader, &mut left)? else { return Ok(None) };
-        let mut whole = length - left;
-        let mut next = |whole: &mut u64| -> Result<Option<Vec<u8>>, SweepError> {
-            let body = frame(&mut reader, &mut left).map_err(failed)?;
-            *whole += body.as_ref().map_or(0, |body| (FRAME + body.len()) as u64);
-            Ok(body)
-        };
-        if let Some(difference) = found.difference(binding) {
-            return Err(SweepError::OtherPart { path: self.path.clone(), difference });
-        }
-        let (points, width) = (binding.points(), binding.width());
-        let (results, mut tally) = (whole, Tally::default());
-        loop {
-            let before = whole;
-            let Some(body) = next(&mut whole)? else { break };
-            if let Some(notice) = body.strip_prefix(&NOTICE) {
-                binding.provenance.notices.push(String::from_utf8_lossy(notice).into_owned());
-                continue;
-            }
-            let first = binding.shard.rest(binding.grid.points(), tally.points).start;
-            match Columns::decode(&body, first, width) {
-                Some(chunk) if chunk.points() <= points - tally.points => {
-                    tally.add(&chunk);
-                }
-                _ => {
-                    whole = before;
-                    break;
-                }
-            }
-        }
-        drop(reader);
-        self.file.set_len(whole).map_err(failed)?;
-        self.file.seek(SeekFrom::Start(whole)).map_err(failed)?;
-        self.results = results;
-        binding.provenance.date = found.provenance.date;
-        Ok(Some(tally))
-    }
-
-    fn foreign(&self, reason: &str) -> SweepError {
-        SweepError::ForeignPart { path: self.path.clone(), reason: reason.into() }
-    }
 }
 
-/// Contents of a frame.
-pub(super) enum Frame {
-    /// Results of consecutive points.
-    Block,
-    /// Something that provenance will tell.
-    Notice(String),
-}
-
-/// The binding of the part in `bytes`, and where its results begin; or why it has none.
-pub(super) fn binding(bytes: &[u8]) -> Result<(Binding, usize), String> {
-    let not_ours = "it is no part of a bake by this version";
-    let mut place = if bytes.starts_with(MAGIC) { MAGIC.len() } else { return Err(not_ours.into()) };
-    let body = body(bytes, &mut place).and_then(|body| bytes.get(body)).ok_or("its beginning is damaged")?;
-    let binding = serde_json::from_slice(body).map_err(|error| error.to_string())?;
-    Ok((binding, place))
-}
-
-/// The frame at `place` in the part `bytes`, behind which `place` then is, and where its body lies; `None` when there
-/// is no whole one.
-pub(super) fn next(bytes: &[u8], place: &mut usize) -> Option<(Frame, Range<usize>)> {
-    let body = body(bytes, place)?;
-    let notice = bytes.get(body.clone())?.strip_prefix(&NOTICE);
-    let frame = notice.map_or(Frame::Block, |text| Frame::Notice(String::from_utf8_lossy(text).into_owned()));
-    Some((frame, body))
-}
-
-/// Returns where the body of the frame at `place` lies, if it is whole.
-fn body(bytes: &[u8], place: &mut usize) -> Option<Range<usize>> {
-    let mut rest = bytes.get(*place..)?;
-    let mut left = rest.len() as u64;
-    let body = frame(&mut rest, &mut left).ok()??;
-    let end = bytes.len() - rest.len();
-    *place = end;
-    Some(end - body.len()..end)
-}
-
-/// The next frame's body, of a file with `left` bytes left; `None` when there is no whole one.
-fn frame(reader: &mut impl Read, left: &mut u64) -> io::Result<Option<Vec<u8>>> {
-    let Some(room) = left.checked_sub(FRAME as u64) else { return Ok(None) };
-    let (mut length, mut checksum) = ([0; 8], [0; 4]);
-    reader.read_exact(&mut length)?;
-    reader.read_exact(&mut checksum)?;
-    let length = u64::from_le_bytes(length);
-    // The length is bounded by the file's before anything is allocated for it.
-    let Some(after) = room.checked_sub(length) else { return Ok(None) };
-    let mut body = vec![0; usize::try_from(length).map_err(io::Error::other)?];
-    reader.read_exact(&mut body)?;
-    *left = after;
-    Ok((crc32fast::hash(&body) == u32::from_le_bytes(checksum)).then_some(body))
+/// Returns where the body of the frame at `place` of `bytes` lies; `None` when there is no whole one.
+fn frame(bytes: &[u8], place: usize) -> Option<Range<usize>> {
+    let (length, rest) = bytes.get(place..)?.split_first_chunk()?;
+    let (checksum, rest) = rest.split_first_chunk()?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+    let begin = bytes.len() - rest.len();
+    (crc32fast::hash(rest.get(..length)?) == u32::from_le_bytes(*checksum)).then_some(begin..begin + length)
 }

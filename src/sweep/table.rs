@@ -1,6 +1,12 @@
-//! The results of all grid points, read point by point in any order: in memory, or in the part on the disk.
+//! The results of all grid points, read point by point in any order: in memory, or in the part on the disk, where they
+//! lie in blocks.
+//!
+//! ```text
+//! u64 first point, u64 points, u64 contacts of the object's nodes, u64 touches of the proxy's
+//! the columns, in the order of `RESULTS`; those of offsets hold the end of each point's row within the block
+//! ```
 
-use super::columns::{COLUMNS, Columns, Replaced, Width};
+use super::columns::{COLUMNS, Columns, Replaced, Width, lengths};
 use crate::{
     JointVector,
     contact::{Equilibrium, NodeForce, Status},
@@ -17,6 +23,9 @@ pub(super) struct Table<'a> {
     blocks: Vec<Block<'a>>,
     pub replaced: Replaced,
 }
+
+/// Numbers before the columns of a block.
+const OPENING: usize = 4;
 
 /// Columns of consecutive points as bytes, by [`Stored`]; they need not be aligned.
 #[derive(Clone, Copy)]
@@ -47,6 +56,12 @@ impl PointResult {
         let Equilibrium { status, iterations, residual, energy, gap, torque, .. } = *equilibrium;
         Self { status, torque, energy, gap: gap as f32, residual: residual as f32, iterations }
     }
+
+    /// The result where nothing touches, `gap` away (m).
+    pub fn free(joints: usize, gap: f32) -> Self {
+        let torque = JointVector::zeros(joints);
+        Self { status: Status::Free, torque, energy: 0.0, gap, residual: 0.0, iterations: 0 }
+    }
 }
 
 impl<'a> Block<'a> {
@@ -55,7 +70,38 @@ impl<'a> Block<'a> {
         Self { first, columns: columns.bytes() }
     }
 
-    fn number<T: Pod>(&self, array: Stored, index: usize) -> T {
+    /// Reads a block of points of `width`; `None` when it is none.
+    pub fn read(bytes: &'a [u8], width: Width) -> Option<Self> {
+        let (opening, mut rest) = bytes.split_first_chunk::<{ 8 * OPENING }>()?;
+        let numbers: [[u8; 8]; OPENING] = bytemuck::cast(*opening);
+        let mut numbers = numbers.into_iter().map(|number| usize::try_from(u64::from_le_bytes(number)).ok());
+        let mut next = || numbers.next().flatten();
+        let (first, points, contacts, touches) = (next()?, next()?, next()?, next()?);
+        let mut columns = [&[][..]; COLUMNS];
+        for (column, length) in columns.iter_mut().zip(lengths(points, width, contacts, touches)) {
+            (*column, rest) = rest.split_at_checked(length)?;
+        }
+        let block = Self { first, columns };
+        let rows = [(Stored::ContactOffsets, contacts), (Stored::TouchOffsets, touches)];
+        (rest.is_empty() && rows.into_iter().all(|(ends, count)| block.rows_fit(ends, count))).then_some(block)
+    }
+
+    /// How it begins, where it is written.
+    pub fn opening(&self) -> [u8; 8 * OPENING] {
+        let count = |nodes: Stored| self.columns[nodes as usize].len() / size_of::<u32>();
+        let numbers = [self.first, self.points(), count(Stored::ContactNodes), count(Stored::TouchNodes)];
+        bytemuck::cast(numbers.map(|number| (number as u64).to_le_bytes()))
+    }
+
+    /// Whether the rows that end at `ends` follow one another up to `count`.
+    fn rows_fit(&self, ends: Stored, count: usize) -> bool {
+        let ends = self.columns[ends as usize].chunks_exact(size_of::<u64>());
+        let ends: Vec<u64> = ends.map(bytemuck::pod_read_unaligned).collect();
+        ends.is_sorted() && ends.last().copied().unwrap_or(0) == count as u64
+    }
+
+    /// A number of a column.
+    pub fn number<T: Pod>(&self, array: Stored, index: usize) -> T {
         let size = size_of::<T>();
         bytemuck::pod_read_unaligned(&self.columns[array as usize][index * size..(index + 1) * size])
     }
@@ -75,7 +121,8 @@ impl<'a> Block<'a> {
         }
     }
 
-    fn status(&self, row: usize) -> Status {
+    /// Status of a point of the block.
+    pub fn status(&self, row: usize) -> Status {
         Status::from_number(self.columns[Stored::Status as usize][row]).unwrap_or(Status::Outside)
     }
 
@@ -88,7 +135,8 @@ impl<'a> Block<'a> {
         &self.columns[array as usize][size * entries.start..size * entries.end]
     }
 
-    fn points(&self) -> usize {
+    /// Number of points.
+    pub fn points(&self) -> usize {
         self.columns[Stored::Status as usize].len()
     }
 

@@ -1,10 +1,10 @@
 //! The counts that a sweep keeps on the way, so that it need not keep its results to sum them up.
 
-use super::{
-    columns::Columns,
-    table::{PointResult, Table},
+use super::table::{Block, PointResult, Table};
+use crate::{
+    contact::Status,
+    dataset::{StatusCounts, Stored},
 };
-use crate::{contact::Status, dataset::StatusCounts};
 use rayon::prelude::*;
 
 /// Points that one thread counts at a time.
@@ -43,11 +43,12 @@ impl Tally {
         self
     }
 
-    /// Counts the points of `chunk`.
-    pub fn add(&mut self, chunk: &Columns) {
-        self.points += chunk.points();
-        for ((&number, &iterations), &residual) in chunk.status.iter().zip(&chunk.iterations).zip(&chunk.residual) {
-            self.count(Status::from_number(number).unwrap_or(Status::Outside), iterations, residual);
+    /// Counts the points of `block`.
+    pub fn add(&mut self, block: &Block<'_>) {
+        self.points += block.points();
+        for row in 0..block.points() {
+            let (iterations, residual) = (block.number(Stored::Iterations, row), block.number(Stored::Residual, row));
+            self.count(block.status(row), iterations, residual);
         }
     }
 
