@@ -144,7 +144,7 @@ impl ErrorCheck<'_> {
             let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
             (place.q, corners.collect())
         });
-        Ok(Some(Measured { error, notice: thin_parts::notice(self.model, cells) }))
+        Ok(Some(Measured { error, notice: thin_parts::notice(self.model, 0.0, cells) }))
     }
 }
 
