@@ -14,6 +14,7 @@ use super::bernstein::{Bernstein, Bounds, place};
 use crate::{
     JointVector,
     dataset::{Grid, Stencil},
+    store::basis,
 };
 
 /// An interpolated function.
@@ -116,7 +117,7 @@ impl Hermite {
         let corner = |c: usize| &self.derivatives[stencil.points[c] << D..(stencil.points[c] + 1) << D];
         // The last axis, straight from the records.
         let mut half = 1 << (D - 1);
-        let (weights, rates) = basis(stencil.fractions[D - 1]);
+        let [weights, rates] = basis(stencil.fractions[D - 1]);
         for c in 0..half {
             let (near, far) = (corner(c).split_at(half), corner(c + half).split_at(half));
             let row = c * half..(c + 1) * half;
@@ -129,7 +130,7 @@ impl Hermite {
         }
         for axis in (0..D - 1).rev() {
             half /= 2;
-            let (weights, rates) = basis(stencil.fractions[axis]);
+            let [weights, rates] = basis(stencil.fractions[axis]);
             contract(&value, &mut slopes[axis], half, &rates);
             contract_in_place(&mut value, half, &weights);
             for slope in &mut slopes[axis + 1..] {
@@ -142,14 +143,6 @@ impl Hermite {
         }
         (value[0], gradient)
     }
-}
-
-/// Weights of f_0, g_0 h, f_1, g_1 h at fraction `x` of a cell, and their derivatives by x.
-fn basis(x: f64) -> ([f64; 4], [f64; 4]) {
-    let far = x * x * (3.0 - 2.0 * x);
-    let rate = 6.0 * x * (1.0 - x);
-    let weights = [1.0 - far, x * (1.0 - x) * (1.0 - x), far, x * x * (x - 1.0)];
-    (weights, [-rate, (1.0 - x) * (1.0 - 3.0 * x), rate, x * (3.0 * x - 2.0)])
 }
 
 fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {

@@ -3,7 +3,7 @@
 //! The scene chooses one of two ways ([`Interpolation`]): `linear` (`layered.rs`) interpolates the torque and holds it
 //! behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient; `direct`,
 //! which solves contact while it is felt, has `potential` wherever its solution is late. A refined dataset is
-//! interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without memory. What they
+//! interpolated by its store, by `potential` (`refined.rs`). All are continuous and without memory. What they
 //! share is here: the cell around q, the fade outside the grid (`dataset/stencil.rs`), what is said of points that were not
 //! computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored
 //! (contact, unconverged, overflowed) and 0 at free points.
@@ -37,7 +37,7 @@ use crate::{
     contact::Status,
     dataset::{Dataset, Grid, Stencil},
     scene::Interpolation,
-    store::{Order, Store},
+    store::Store,
 };
 use layered::Layered;
 use points::{Checked, Point};
@@ -126,8 +126,7 @@ impl TorqueField {
         Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
     }
 
-    /// Any interpolation over `dataset`; a refined one is interpolated in the way of its store, whatever
-    /// `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
+    /// Any interpolation over `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
     /// mixed derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
@@ -186,7 +185,7 @@ impl TorqueField {
     pub fn is_potential(&self) -> bool {
         match &self.source {
             Source::Grid(on_grid) => matches!(on_grid.interpolant, Interpolant::Potential(_)),
-            Source::Store(store) => store.order() == Order::Potential,
+            Source::Store(_) => true,
         }
     }
 

@@ -131,14 +131,11 @@ impl Potential {
         Gradient { torque, energy: self.free_energy + 0.5 * depth * depth, contact: root > 0.0, share }
     }
 
-    /// Returns the greatest bound of the stiffness relative to `slopes` over all cells:
-    /// `d^2 U / dq_a dq_b = w_a w_b + w w_ab` where w is positive, each factor by its bound over the cell.
+    /// Returns the greatest bound of the stiffness relative to `slopes` over all cells.
     pub fn steepest(&self, grid: &Grid, slopes: &JointVector) -> Stiffness {
         let of_cell = |point: usize| {
-            let Some(w) = self.root.bounds(grid, point).filter(|w| w.greatest > 0.0) else {
-                return Stiffness::default();
-            };
-            Stiffness::new(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b])
+            let bounds = self.root.bounds(grid, point).filter(|w| w.greatest > 0.0);
+            bounds.map_or_else(Stiffness::default, |w| w.stiffness(slopes))
         };
         (0..grid.points()).into_par_iter().map(of_cell).reduce(Stiffness::default, Stiffness::max)
     }

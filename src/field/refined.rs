@@ -1,18 +1,17 @@
 //! The field of a refined dataset: the store answers, with the finest of its levels that are there.
 //!
-//! Its order says how (`dataset/store`): `potential` is minus the gradient of one smooth energy, whichever nodes there
-//! are. There is no boundary layer: the torque begins at w = 0 without a jump. A store does not say what it does not
+//! The torque is minus the gradient of one smooth energy, whichever nodes there are (`dataset/store`). There is no boundary layer: the torque begins at w = 0 without a jump. A store does not say what it does not
 //! keep: how many nodes of the object touch.
 
 use super::{
     Flags, Sample,
-    bernstein::{Bernstein, Bounds, place},
+    bernstein::{Bernstein, place},
     stiffness::Stiffness,
 };
 use crate::{
     JointVector, MAX_JOINTS,
     dataset::Grid,
-    store::{Order, Place, Store, beyond, record::sets},
+    store::{Place, Store, beyond, record::sets},
 };
 use rayon::prelude::*;
 
@@ -56,7 +55,7 @@ pub(super) fn steepest(store: &Store, slopes: &JointVector) -> Stiffness {
         let cells = (0..1_usize << joints).filter_map(|side| cell(&node, side));
         let added = cells.filter_map(|low| Some((low, store.added(0, &low)?)));
         added
-            .map(|(low, added)| within(store, slopes, (0, low), &parts(store, added)))
+            .map(|(low, added)| within(store, slopes, (0, low), &polynomial(added)))
             .fold(Stiffness::default(), Stiffness::max)
     };
     let blocks = store.blocks();
@@ -65,25 +64,21 @@ pub(super) fn steepest(store: &Store, slopes: &JointVector) -> Stiffness {
         .reduce(Stiffness::default, Stiffness::max)
 }
 
-/// Returns what interpolates in a cell: w, and for linear stores each slope by itself.
-fn parts(store: &Store, added: Vec<Vec<f64>>) -> Vec<Bernstein> {
-    let joints = store.space().joints();
-    if store.order() == Order::Linear {
-        let of = |kind: usize| added.iter().map(|corner| corner[kind]).collect();
-        return (0..=joints).map(|kind| Bernstein::multilinear(joints, of(kind))).collect();
-    }
+/// Returns w in a cell of which `added` are the numbers, corner by corner.
+fn polynomial(added: Vec<Vec<f64>>) -> Bernstein {
+    let joints = added.len().ilog2() as usize;
     let mut numbers = vec![0.0; 1 << (2 * joints)];
     for (side, corner) in added.iter().enumerate() {
         for (set, number) in sets(joints).zip(corner) {
             numbers[place(joints, side, set)] = *number;
         }
     }
-    vec![Bernstein::hermite(joints, numbers)]
+    Bernstein::hermite(joints, numbers)
 }
 
 /// Returns the greatest bound within the `cell`, a level and its first corner, in which the levels up to this one sum
 /// up to `whole`: where a finer level adds something, with it.
-fn within(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Bernstein]) -> Stiffness {
+fn within(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &Bernstein) -> Stiffness {
     let (space, joints) = (store.space(), slopes.len());
     let (level, low) = cell;
     let finer = level + 1;
@@ -97,26 +92,19 @@ fn within(store: &Store, slopes: &JointVector, cell: (u32, Place), whole: &[Bern
     let below = if coarse { of_cell(store, slopes, level, whole) } else { Stiffness::default() };
     let refined = added.into_iter().enumerate().filter_map(|(side, added)| Some((side, added?)));
     let steepest_of = |(side, added): (usize, Vec<Vec<f64>>)| {
-        let mut part: Vec<Bernstein> = whole.iter().map(|whole| whole.half(side)).collect();
-        part.iter_mut().zip(parts(store, added)).for_each(|(sum, more)| sum.add(&more));
+        let mut part = whole.half(side);
+        part.add(&polynomial(added));
         within(store, slopes, (finer, child(side)), &part)
     };
     refined.map(steepest_of).fold(below, Stiffness::max)
 }
 
-/// Returns a bound over one cell of `level`: `d tau_a/d q_b = -(w_b s_a + w ds_a/dq_b)` with the slopes s, those of w
-/// or a linear store's own, which it keeps by steps of the base.
-fn of_cell(store: &Store, slopes: &JointVector, level: u32, parts: &[Bernstein]) -> Stiffness {
-    let space = store.space();
-    let mut per_step = JointVector::zeros(slopes.len());
-    per_step.iter_mut().enumerate().for_each(|(a, per_step)| *per_step = 1.0 / space.step(level, a));
-    let Some((root, own)) = parts.split_first().filter(|(root, _)| root.greatest() > 0.0) else {
+/// Returns a bound over one cell of `level`: `d tau_a/d q_b = -(w_b w_a + w w_ab)`.
+fn of_cell(store: &Store, slopes: &JointVector, level: u32, root: &Bernstein) -> Stiffness {
+    if root.greatest() <= 0.0 {
         return Stiffness::default();
-    };
-    let w = root.bounds(&per_step);
-    if own.is_empty() {
-        return Stiffness::new(slopes, |a, b| w.first[a] * w.first[b] + w.greatest * w.second[a][b]);
     }
-    let own: Vec<Bounds> = own.iter().map(|slope| slope.bounds(&per_step)).collect();
-    Stiffness::new(slopes, |a, b| (own[a].size * w.first[b] + w.greatest * own[a].first[b]) / space.step(0, a))
+    let mut per_step = JointVector::zeros(slopes.len());
+    per_step.iter_mut().enumerate().for_each(|(a, per_step)| *per_step = 1.0 / store.space().step(level, a));
+    root.bounds(&per_step).stiffness(slopes)
 }

@@ -6,15 +6,14 @@
 //! | `directory` | from keys to blocks, for readers that never wait |
 //! | `block` | what a block holds |
 //! | `record` | the numbers of a node |
-//! | `kernel` | the interpolants of one cell |
+//! | `kernel` | the interpolant of one cell |
 //! | `file` | a store on disk |
 //!
 //! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have
 //! more than the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a
 //! node are tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and
-//! mixed second derivatives ([`Order::Potential`]), or hats ([`Order::Linear`]). A node that was not solved has no
-//! surplus: there the function is what the coarser levels say. So w is C1, or continuous, whichever nodes there are,
-//! and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
+//! mixed second derivatives. A node that was not solved has no surplus: there the function is what the coarser levels
+//! say. So w is C1, whichever nodes there are, and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
 //! 3, for hats; here with Hermite data and without the sparse grid's choice of levels.)
 //!
 //! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the
@@ -38,6 +37,7 @@ pub use space::{Place, Space, SpaceError};
 use crate::{JointVector, MAX_JOINTS};
 pub(crate) use block::beyond;
 use directory::{Directory, Refusal};
+pub(crate) use kernel::basis;
 use record::{MAX_WIDTH, mixed, sets, slope, width};
 use space::MOST_BLOCK_JOINTS;
 use std::sync::{
@@ -45,23 +45,12 @@ use std::sync::{
     atomic::{AtomicU64, Ordering},
 };
 
-/// How a store interpolates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Order {
-    /// w and its gradient, each multilinear: continuous.
-    Linear,
-    /// w by cubic Hermite polynomials: C1, and the gradient is that of w.
-    Potential,
-}
-
 /// Blocks of C-space at several levels. Any number of threads may read and publish at once.
 ///
 /// Blocks are numbered in the order in which they are published. A reader that needs the same function twice, between
 /// which others publish, names a [horizon](Store::horizon): the number of blocks that count.
 pub struct Store {
     space: Space,
-    order: Order,
     blocks: Directory<Block>,
     /// Number of the next block. Held by writers while a block gets its number and is published, so that all before it
     /// are there.
@@ -144,8 +133,8 @@ impl Root {
 impl Store {
     /// An empty store over `space` with room for `most` blocks.
     #[must_use]
-    pub fn new(space: Space, order: Order, most: usize) -> Self {
-        Self { space, order, blocks: Directory::new(most), numbers: Mutex::new(0), published: AtomicU64::new(0) }
+    pub fn new(space: Space, most: usize) -> Self {
+        Self { space, blocks: Directory::new(most), numbers: Mutex::new(0), published: AtomicU64::new(0) }
     }
 
     /// Number of blocks published so far: what [`Store::sample_within`] needs to see the same function again.
@@ -164,12 +153,6 @@ impl Store {
     #[must_use]
     pub fn space(&self) -> &Space {
         &self.space
-    }
-
-    /// Returns how it interpolates.
-    #[must_use]
-    pub fn order(&self) -> Order {
-        self.order
     }
 
     /// Makes room for `most` blocks.
@@ -260,36 +243,20 @@ impl Store {
         }
     }
 
-    /// Numbers of a node's surplus.
-    fn kinds(&self) -> usize {
-        match self.order {
-            Order::Linear => 1 + self.space.joints(),
-            Order::Potential => width(self.space.joints()),
-        }
-    }
-
     /// Surplus of the `nodes` of a block of `level`, all of whose nodes are `all`.
     fn surplus(&self, level: u32, all: &[(usize, Place)], nodes: &Nodes) -> Box<[f32]> {
         let joints = self.space.joints();
-        let kinds = self.kinds();
-        let mut surplus = vec![0.0; kinds * nodes.count()].into_boxed_slice();
+        let wide = width(joints);
+        let mut surplus = vec![0.0; wide * nodes.count()].into_boxed_slice();
         let solved =
-            all.iter().filter(|(place, _)| nodes.present >> place & 1 == 1).zip(surplus.chunks_exact_mut(kinds));
-        for (((_, node), surplus), record) in solved.zip(nodes.records.chunks_exact(width(joints))) {
+            all.iter().filter(|(place, _)| nodes.present >> place & 1 == 1).zip(surplus.chunks_exact_mut(wide));
+        for (((_, node), surplus), record) in solved.zip(nodes.records.chunks_exact(wide)) {
             let below = self.record(level, node);
             for (kind, set) in sets(joints).enumerate() {
-                let position = match self.order {
-                    Order::Potential => kind,
-                    Order::Linear if set.count_ones() <= 1 => (set << 1).checked_ilog2().unwrap_or(0) as usize,
-                    Order::Linear => continue,
-                };
                 let derivatives = (0..joints).filter(|a| set >> a & 1 == 1);
                 let step: f64 = derivatives.map(|a| self.space.step(0, a)).product();
-                let scale = match self.order {
-                    Order::Linear => 1.0,
-                    Order::Potential => 0.5_f64.powi((level * set.count_ones()) as i32),
-                };
-                surplus[position] = ((f64::from(record[kind]) * step - below[kind]) * scale) as f32;
+                let scale = 0.5_f64.powi((level * set.count_ones()) as i32);
+                surplus[kind] = ((f64::from(record[kind]) * step - below[kind]) * scale) as f32;
             }
         }
         surplus
@@ -308,23 +275,11 @@ impl Store {
             for side in 0..corners {
                 let corner = beyond(&cell.low, side);
                 let Some(block) = self.get(below, &self.space.block_of(&corner)) else { continue };
-                let Some(surplus) = block.surplus_at(self.space.place_of(&corner), self.kinds()) else { continue };
-                let at = |kind: usize| f64::from(surplus[kind]);
-                match self.order {
-                    Order::Linear => {
-                        let weight: f64 = (0..joints)
-                            .map(|a| if side >> a & 1 == 1 { cell.fractions[a] } else { 1.0 - cell.fractions[a] })
-                            .product();
-                        sum[0] += weight * at(0);
-                        (0..joints).for_each(|a| sum[slope(a)] += weight * at(1 + a));
-                    }
-                    Order::Potential => {
-                        let Some(weights) = kernel::transfer(joints, side, &cell.fractions) else { continue };
-                        for ((sum, weights), set) in sum.iter_mut().zip(&weights).zip(sets(joints)) {
-                            let scale = f64::from(1_u32 << below).powi(set.count_ones() as i32);
-                            *sum += scale * (0..wide).map(|kind| weights[kind] * at(kind)).sum::<f64>();
-                        }
-                    }
+                let Some(surplus) = block.surplus_at(self.space.place_of(&corner), wide) else { continue };
+                let Some(weights) = kernel::transfer(joints, side, &cell.fractions) else { continue };
+                for ((sum, weights), set) in sum.iter_mut().zip(&weights).zip(sets(joints)) {
+                    let scale = f64::from(1_u32 << below).powi(set.count_ones() as i32);
+                    *sum += scale * surplus.iter().zip(weights).map(|(x, weight)| weight * f64::from(*x)).sum::<f64>();
                 }
             }
         }
@@ -342,63 +297,28 @@ impl Store {
     #[must_use]
     pub fn sample_within(&self, q: &[f64], horizon: u64) -> Root {
         use kernel::rates;
-        match (self.order, self.space.joints()) {
-            (Order::Linear, 1) => self.linear::<1, 2, 2>(q, horizon),
-            (Order::Linear, 2) => self.linear::<2, 4, 3>(q, horizon),
-            (Order::Linear, 3) => self.linear::<3, 8, 4>(q, horizon),
-            (Order::Linear, 4) => self.linear::<4, 16, 5>(q, horizon),
-            (Order::Linear, 5) => self.linear::<5, 32, 6>(q, horizon),
-            (Order::Linear, _) => self.linear::<MAX_JOINTS, 64, 7>(q, horizon),
-            (Order::Potential, 1) => self.potential::<1, 2, { width(1) }, { rates(1) }>(q, horizon),
-            (Order::Potential, 2) => self.potential::<2, 4, { width(2) }, { rates(2) }>(q, horizon),
-            (Order::Potential, 3) => self.potential::<3, 8, { width(3) }, { rates(3) }>(q, horizon),
-            (Order::Potential, 4) => self.potential::<4, 16, { width(4) }, { rates(4) }>(q, horizon),
-            (Order::Potential, 5) => self.potential::<5, 32, { width(5) }, { rates(5) }>(q, horizon),
-            (Order::Potential, _) => self.potential::<MAX_JOINTS, 64, MAX_WIDTH, { rates(MAX_JOINTS) }>(q, horizon),
+        match self.space.joints() {
+            1 => self.sum::<1, 2, { width(1) }, { rates(1) }>(q, horizon),
+            2 => self.sum::<2, 4, { width(2) }, { rates(2) }>(q, horizon),
+            3 => self.sum::<3, 8, { width(3) }, { rates(3) }>(q, horizon),
+            4 => self.sum::<4, 16, { width(4) }, { rates(4) }>(q, horizon),
+            5 => self.sum::<5, 32, { width(5) }, { rates(5) }>(q, horizon),
+            _ => self.sum::<MAX_JOINTS, 64, MAX_WIDTH, { rates(MAX_JOINTS) }>(q, horizon),
         }
     }
 
-    /// `C = 2^D`, `N = 1 + D`.
-    fn linear<const D: usize, const C: usize, const N: usize>(&self, q: &[f64], horizon: u64) -> Root {
-        self.sum::<D, C, N>(q, horizon, |_, numbers, fractions, root| {
-            kernel::multilinear::<D, C>(numbers, fractions);
-            root.value += numbers[0][0];
-            root.slopes.iter_mut().zip(&numbers[1..]).for_each(|(sum, slope)| *sum += slope[0]);
-        })
-    }
-
-    /// `C = 2^D`, `W = width(D)`, `R = rates(D)`.
-    fn potential<const D: usize, const C: usize, const W: usize, const R: usize>(
-        &self,
-        q: &[f64],
-        horizon: u64,
-    ) -> Root {
-        self.sum::<D, C, W>(q, horizon, |level, numbers, fractions, root| {
-            let (value, slopes) = kernel::hermite::<D, C, W, R>(numbers, fractions);
-            let rise = f64::from(1_u32 << level);
-            root.value += value;
-            root.slopes.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += rise * slope);
-        })
-    }
-
-    /// Adds up the levels: `add` adds one, from the `N` numbers at the `C` corners of the cell of that level and the
-    /// fractions of it.
-    #[inline]
-    fn sum<const D: usize, const C: usize, const N: usize>(
-        &self,
-        q: &[f64],
-        horizon: u64,
-        mut add: impl FnMut(u32, &mut [[f64; C]; N], &[f64; MAX_JOINTS], &mut Root),
-    ) -> Root {
+    /// Adds up the levels, each from the `W` numbers at the `C` corners of its cell. `C = 2^D`, `W = width(D)`,
+    /// `R = rates(D)`.
+    fn sum<const D: usize, const C: usize, const W: usize, const R: usize>(&self, q: &[f64], horizon: u64) -> Root {
         let slopes = JointVector::zeros(self.space.joints());
         let mut root = Root { value: 0.0, slopes, levels: 0, whole: 0, failed: false };
-        let mut numbers = [[0.0; C]; N];
+        let mut numbers = [[0.0; C]; W];
         let mut cell = self.space.locate(q);
         for level in 0..self.space.levels() {
             if level > 0 {
                 cell.halve();
             }
-            let gathered = self.gather::<D, C, N>(level, &cell.low, horizon, &mut numbers);
+            let gathered = self.gather::<D, C, W>(level, &cell.low, horizon, &mut numbers);
             if !gathered.found {
                 break;
             }
@@ -406,7 +326,10 @@ impl Store {
             root.whole += u32::from(gathered.whole && root.whole == level);
             root.failed |= gathered.failed;
             if gathered.any {
-                add(level, &mut numbers, &cell.fractions, &mut root);
+                let (value, slopes) = kernel::hermite::<D, C, W, R>(&mut numbers, &cell.fractions);
+                let rise = f64::from(1_u32 << level);
+                root.value += value;
+                root.slopes.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += rise * slope);
             }
         }
         root.slopes.iter_mut().enumerate().for_each(|(a, slope)| *slope /= self.space.step(0, a));
@@ -474,10 +397,10 @@ impl Store {
         let block = |node: &Place| self.get(level, &self.space.block_of(node));
         nodes().any(|node| block(&node).is_some()).then(|| {
             let numbers = |node: Place| {
-                let surplus = block(&node)?.surplus_at(self.space.place_of(&node), self.kinds())?;
+                let surplus = block(&node)?.surplus_at(self.space.place_of(&node), width(self.space.joints()))?;
                 Some(surplus.iter().map(|&number| number.into()).collect())
             };
-            nodes().map(|node| numbers(node).unwrap_or_else(|| vec![0.0; self.kinds()])).collect()
+            nodes().map(|node| numbers(node).unwrap_or_else(|| vec![0.0; width(self.space.joints())])).collect()
         })
     }
 
