@@ -6,7 +6,7 @@
 //! axis a.
 
 use super::stiffness::Stiffness;
-use crate::{JointMatrix, JointVector, MAX_JOINTS};
+use crate::{JointMatrix, JointVector, MAX_JOINTS, store::record::sets};
 
 /// Degree along each axis.
 const DEGREE: usize = 3;
@@ -20,7 +20,7 @@ pub(super) struct Bernstein {
 
 /// The place, of `4^joints`, of the number of Hermite interpolation that is derived along the axes in `set`, at the
 /// corner on `side`: digit a, to base 4, is twice the side along axis a, and one more for the derivative along it.
-pub(super) fn place(joints: usize, side: usize, set: usize) -> usize {
+fn place(joints: usize, side: usize, set: usize) -> usize {
     (0..joints).map(|a| (2 * (side >> a & 1) + (set >> a & 1)) << (2 * a)).sum()
 }
 
@@ -43,9 +43,15 @@ impl Bounds {
 }
 
 impl Bernstein {
-    /// The cubic Hermite interpolant of `numbers`, each in its [`place`], lengths in steps of the cell.
-    pub fn hermite(joints: usize, numbers: Vec<f64>) -> Self {
-        let mut cell = Self { joints, coefficients: numbers };
+    /// The cubic Hermite interpolant of the `numbers` of a cell's corners, kind by kind ([`crate::store::record`]),
+    /// lengths in steps of the cell. Those of the kinds that there are not are zero.
+    pub fn hermite(joints: usize, numbers: &[f64]) -> Self {
+        let mut cell = Self { joints, coefficients: vec![0.0; 1 << (2 * joints)] };
+        for (set, numbers) in sets(joints).zip(numbers.chunks_exact(1 << joints)) {
+            for (side, number) in numbers.iter().enumerate() {
+                cell.coefficients[place(joints, side, set)] = *number;
+            }
+        }
         for axis in 0..joints {
             cell.along(axis, |line| {
                 line[1] = line[0] + line[1] / 3.0;
@@ -169,10 +175,10 @@ mod tests {
     #[test]
     fn a_half_is_the_same_polynomial_and_bounds_hold() {
         let number = |k: usize| ((k * k + 7) as f64 * 0.37).sin();
-        let cubic = Bernstein::hermite(2, (0..16).map(number).collect());
+        let cubic = Bernstein::hermite(2, &(0..16).map(number).collect::<Vec<_>>());
         // At the corners the values that it was made from.
-        assert!((value(&cubic, &[1.0, 0.0]) - number(2)).abs() < 1e-14);
-        assert!((value(&cubic, &[0.0, 1.0]) - number(8)).abs() < 1e-14);
+        assert!((value(&cubic, &[1.0, 0.0]) - number(1)).abs() < 1e-14);
+        assert!((value(&cubic, &[0.0, 1.0]) - number(2)).abs() < 1e-14);
         let steps = JointVector::from_slice(&[4.0, 2.0]);
         for side in 0..4 {
             let part = cubic.half(side);

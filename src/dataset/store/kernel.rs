@@ -24,7 +24,7 @@ pub(super) const fn rates(joints: usize) -> usize {
 }
 
 /// Weights of f_0, g_0, f_1, g_1 at fraction `x` of a cell, and their derivatives by x.
-pub(crate) fn basis(x: f64) -> [[f64; 4]; 2] {
+fn basis(x: f64) -> [[f64; 4]; 2] {
     let far = x * x * (3.0 - 2.0 * x);
     let rate = 6.0 * x * (1.0 - x);
     let weights = [1.0 - far, x * (1.0 - x) * (1.0 - x), far, x * x * (x - 1.0)];

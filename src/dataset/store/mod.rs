@@ -7,6 +7,7 @@
 //! | `block` | what a block holds |
 //! | `record` | the numbers of a node |
 //! | `kernel` | the interpolant of one cell |
+//! | `levels` | the sum of the levels' cells |
 //! | `file` | a store on disk |
 //!
 //! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have
@@ -26,6 +27,7 @@ mod block;
 mod directory;
 pub(super) mod file;
 mod kernel;
+mod levels;
 pub mod record;
 pub mod space;
 mod sync;
@@ -34,10 +36,11 @@ pub use block::{Block, Nodes};
 pub use file::check_memory;
 pub use space::{Place, Space, SpaceError};
 
-use crate::{JointVector, MAX_JOINTS};
+use crate::{MAX_JOINTS, dataset::Grid};
 pub(crate) use block::beyond;
 use directory::{Directory, Refusal};
-pub(crate) use kernel::basis;
+pub use levels::Root;
+pub(crate) use levels::{Gathered, Levels, added, root, with_joints};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
 use space::MOST_BLOCK_JOINTS;
 use std::sync::{
@@ -87,49 +90,6 @@ pub enum PublishError {
     Full(usize),
 }
 
-/// The interpolated function at one configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Root {
-    /// w (sqrt(J)).
-    pub value: f64,
-    /// Its gradient (sqrt(J)/rad or /m).
-    pub slopes: JointVector,
-    /// Levels with a block around the configuration; 0 if there is none.
-    pub levels: u32,
-    /// Levels, from the base up, whose cell around the configuration has all its blocks.
-    pub whole: u32,
-    /// Whether a node around the configuration did not converge.
-    pub failed: bool,
-}
-
-/// Values at the corners of a cell.
-struct Gathered {
-    /// A block.
-    found: bool,
-    /// All blocks.
-    whole: bool,
-    /// A node.
-    any: bool,
-    /// A node that did not converge.
-    failed: bool,
-}
-
-impl Root {
-    /// Energy of contact, `U = max(0, w)^2 / 2` (J).
-    #[must_use]
-    pub fn energy(&self) -> f64 {
-        0.5 * self.value.max(0.0).powi(2)
-    }
-
-    /// Contact torque, `-dU/dq` where the slopes are the gradient of w: zero at w = 0, without a jump (N m or N).
-    #[must_use]
-    pub fn torque(&self) -> JointVector {
-        let mut torque = self.slopes;
-        torque.iter_mut().for_each(|slope| *slope *= -self.value.max(0.0));
-        torque
-    }
-}
-
 impl Store {
     /// An empty store over `space` with room for `most` blocks.
     #[must_use]
@@ -140,7 +100,7 @@ impl Store {
     /// Number of blocks published so far: what [`Store::sample_within`] needs to see the same function again.
     #[must_use]
     pub fn horizon(&self) -> u64 {
-        self.published.load(Ordering::Acquire)
+        Levels::horizon(self)
     }
 
     /// Most blocks for which there is room.
@@ -296,63 +256,56 @@ impl Store {
     /// those on which it rests, which were published before it.
     #[must_use]
     pub fn sample_within(&self, q: &[f64], horizon: u64) -> Root {
-        use kernel::rates;
-        match self.space.joints() {
-            1 => self.sum::<1, 2, { width(1) }, { rates(1) }>(q, horizon),
-            2 => self.sum::<2, 4, { width(2) }, { rates(2) }>(q, horizon),
-            3 => self.sum::<3, 8, { width(3) }, { rates(3) }>(q, horizon),
-            4 => self.sum::<4, 16, { width(4) }, { rates(4) }>(q, horizon),
-            5 => self.sum::<5, 32, { width(5) }, { rates(5) }>(q, horizon),
-            _ => self.sum::<MAX_JOINTS, 64, MAX_WIDTH, { rates(MAX_JOINTS) }>(q, horizon),
-        }
+        levels::root(self, q, horizon)
     }
 
-    /// Adds up the levels, each from the `W` numbers at the `C` corners of its cell. `C = 2^D`, `W = width(D)`,
-    /// `R = rates(D)`.
-    fn sum<const D: usize, const C: usize, const W: usize, const R: usize>(&self, q: &[f64], horizon: u64) -> Root {
-        let slopes = JointVector::zeros(self.space.joints());
-        let mut root = Root { value: 0.0, slopes, levels: 0, whole: 0, failed: false };
-        let mut numbers = [[0.0; C]; W];
-        let mut cell = self.space.locate(q);
-        for level in 0..self.space.levels() {
-            if level > 0 {
-                cell.halve();
-            }
-            let gathered = self.gather::<D, C, W>(level, &cell.low, horizon, &mut numbers);
-            if !gathered.found {
-                break;
-            }
-            root.levels = level + 1;
-            root.whole += u32::from(gathered.whole && root.whole == level);
-            root.failed |= gathered.failed;
-            if gathered.any {
-                let (value, slopes) = kernel::hermite::<D, C, W, R>(&mut numbers, &cell.fractions);
-                let rise = f64::from(1_u32 << level);
-                root.value += value;
-                root.slopes.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += rise * slope);
-            }
-        }
-        root.slopes.iter_mut().enumerate().for_each(|(a, slope)| *slope /= self.space.step(0, a));
-        root
+    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).
+    #[must_use]
+    pub fn most_bytes(joints: usize, nodes: usize) -> [usize; 2] {
+        let record = size_of::<f32>() * width(joints);
+        // Numbers of the node and of the interpolation, its gap and status; in the file key and places of the block.
+        let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * record + size_of::<f32>() + 1;
+        let file = 2 * size_of::<u64>() + record + size_of::<f32>() + 1;
+        [memory, file].map(|each| nodes.saturating_mul(each))
     }
 
-    /// Copies the surplus at the corners of the cell with first corner `low`, zeros where there is no node.
-    fn gather<const D: usize, const C: usize, const N: usize>(
+    /// Memory of all blocks (bytes).
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.blocks.iter().map(|(_, block)| block.bytes() + 2 * size_of::<usize>()).sum()
+    }
+}
+
+impl Levels for Store {
+    fn base(&self) -> &Grid {
+        self.space.base()
+    }
+
+    fn count(&self) -> u32 {
+        self.space.levels()
+    }
+
+    fn horizon(&self) -> u64 {
+        self.published.load(Ordering::Acquire)
+    }
+
+    fn gather<const C: usize, const W: usize>(
         &self,
         level: u32,
         low: &Place,
         horizon: u64,
-        numbers: &mut [[f64; C]; N],
+        numbers: &mut [[f64; C]; W],
     ) -> Gathered {
+        let joints = const { C.ilog2() as usize };
         // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
         // the other. With blocks of one node they do so along all axes.
-        let parity = (0..D).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
-        let is_one = D > MOST_BLOCK_JOINTS;
+        let parity = (0..joints).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
+        let is_one = joints > MOST_BLOCK_JOINTS;
         let (odd, places) = if is_one { (C - 1, 0) } else { (parity, C - 1) };
         let even = (C - 1) ^ odd;
         // Keys of the block of the first corner, and of those beside it by sets of axes.
         let mut keys = [self.space.key(level, &self.space.block_of(low)); C];
-        for a in 0..D {
+        for a in 0..joints {
             let (near, beyond) = keys.split_at_mut(1 << a);
             beyond.iter_mut().zip(near).for_each(|(beyond, near)| *beyond = near.wrapping_add(self.space.stride(a)));
         }
@@ -368,7 +321,7 @@ impl Store {
             loop {
                 let corner = beside | inside;
                 let place = (corner ^ odd) & places;
-                match block.and_then(|block| block.surplus_at(place, N)) {
+                match block.and_then(|block| block.surplus_at(place, W)) {
                     Some(surplus) => {
                         gathered.any = true;
                         numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
@@ -387,37 +340,6 @@ impl Store {
             }
         }
         gathered
-    }
-
-    /// The numbers that `level` adds at the corners of its cell with first corner `low`, corner by corner, zeros where
-    /// there is no node; `None` where there is no block.
-    #[must_use]
-    pub fn added(&self, level: u32, low: &Place) -> Option<Vec<Vec<f64>>> {
-        let nodes = || (0..1_usize << self.space.joints()).map(|side| beyond(low, side));
-        let block = |node: &Place| self.get(level, &self.space.block_of(node));
-        nodes().any(|node| block(&node).is_some()).then(|| {
-            let numbers = |node: Place| {
-                let surplus = block(&node)?.surplus_at(self.space.place_of(&node), width(self.space.joints()))?;
-                Some(surplus.iter().map(|&number| number.into()).collect())
-            };
-            nodes().map(|node| numbers(node).unwrap_or_else(|| vec![0.0; width(self.space.joints())])).collect()
-        })
-    }
-
-    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).
-    #[must_use]
-    pub fn most_bytes(joints: usize, nodes: usize) -> [usize; 2] {
-        let record = size_of::<f32>() * width(joints);
-        // Numbers of the node and of the interpolation, its gap and status; in the file key and places of the block.
-        let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * record + size_of::<f32>() + 1;
-        let file = 2 * size_of::<u64>() + record + size_of::<f32>() + 1;
-        [memory, file].map(|each| nodes.saturating_mul(each))
-    }
-
-    /// Memory of all blocks (bytes).
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.blocks.iter().map(|(_, block)| block.bytes() + 2 * size_of::<usize>()).sum()
     }
 }
 
