@@ -25,7 +25,7 @@ use haptize::{
         {colour, write_both},
     },
     scene::{ProxyNodeSpec, Scene},
-    store::{Order, Space, Store, record::width},
+    store::{Space, Store, record::width},
     sweep::{
         CpuBackend,
         ahead::{Ahead, Whereabouts},
@@ -144,7 +144,7 @@ fn fill(refine: &Refine<'_>, judges: &mut [Judge; 2], backend: &mut CpuBackend<'
 
 /// Fills a store of so many levels along `places`, and takes its costs there.
 fn explore(model: &Model<'_>, base: &Grid, levels: u32, places: &[JointVector], exact: &[JointVector]) -> Cost {
-    let store = Arc::new(Store::new(Space::new(base, levels).unwrap(), Order::Potential, 2_000_000));
+    let store = Arc::new(Store::new(Space::new(base, levels).unwrap(), 2_000_000));
     let (begin, ahead) = (processor_time(), Ahead::new(model, Arc::clone(&store)));
     let mut solver = ahead.solver();
     for q in places {
@@ -172,7 +172,7 @@ fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 3] {
     let mut judges = [1, 2].map(|seed| Judge::new(&scene, &model, seed, JUDGED).unwrap());
     let mut backend = CpuBackend::new(&model, 0).unwrap();
     let batch = backend.chunk();
-    let refine = |base, levels, aim| Refine { model: &model, base, levels, order: Order::Potential, aim, most, batch };
+    let refine = |base, levels, aim| Refine { model: &model, base, levels, aim, most, batch };
     let base = grid_of(&scene);
     let tell = |kind: &str, cost: &Cost| {
         let Cost { uniform, nodes, bytes, error, look_up, node } = cost;

@@ -28,7 +28,7 @@ use haptize::{
         write_both,
     },
     scene::{Scene, Waypoint},
-    store::{Order, Space, Store},
+    store::{Space, Store},
     sweep::{
         ahead::{Ahead, Follower},
         build_object, grid_of,
@@ -101,7 +101,7 @@ impl World<'_> {
     /// Plays a session and tells of it.
     fn session(&self, device: &mut dyn Device, direct: bool, seconds: f64) -> Seen {
         let grid = grid_of(self.scene);
-        let store = Arc::new(Store::new(Space::new(&grid, self.levels).unwrap(), Order::Potential, 2_000_000));
+        let store = Arc::new(Store::new(Space::new(&grid, self.levels).unwrap(), 2_000_000));
         let ahead = Ahead::new(self.model, Arc::clone(&store));
         let dataset = Dataset::refined(Arc::clone(&store), grid, None, self.scene.text.clone(), Provenance::default());
         let setup = Setup::new(&dataset).unwrap();

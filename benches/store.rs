@@ -28,7 +28,7 @@ use haptize::{
     },
     scene::{Interpolation, JointKind, Scene},
     store::{
-        Nodes, Order, Place, Space, Store,
+        Nodes, Place, Space, Store,
         record::{slope, width},
     },
     sweep::{
@@ -70,11 +70,11 @@ fn places(space: &Space, level: u32) -> Vec<Place> {
 }
 
 /// A store of a half space with all blocks of all levels.
-fn dense(grid: &Grid, levels: u32, order: Order) -> Store {
+fn dense(grid: &Grid, levels: u32) -> Store {
     let joints = grid.joints();
     let space = Space::new(grid, levels).unwrap();
     let blocks: Vec<Vec<Place>> = (0..levels).map(|level| places(&space, level)).collect();
-    let store = Store::new(space.clone(), order, blocks.iter().map(Vec::len).sum());
+    let store = Store::new(space.clone(), blocks.iter().map(Vec::len).sum());
     let normal = 1.0 / (joints as f64).sqrt();
     for (level, blocks) in (0..).zip(&blocks) {
         for block in blocks {
@@ -93,7 +93,7 @@ fn dense(grid: &Grid, levels: u32, order: Order) -> Store {
 }
 
 fn look_ups() {
-    println!("joints  order      nodes/axis  levels  look-up [ns]  whole tick [ns]  dense grid of as many points [ns]");
+    println!("joints  nodes/axis  levels  look-up [ns]  whole tick [ns]  dense grid of as many points [ns]");
     for (joints, count, levels) in
         [(3, 29, 1), (3, 8, 3), (3, 4, 4), (4, 5, 2), (5, 4, 2), (6, 7, 1), (6, 4, 2), (6, 2, 3)]
     {
@@ -105,33 +105,29 @@ fn look_ups() {
         let placing = nanoseconds(BLOCKS, LOOK_UPS, |k| {
             black_box(place(k));
         });
-        for (order, interpolation) in
-            [(Order::Linear, Interpolation::Linear), (Order::Potential, Interpolation::Potential)]
-        {
-            let base = synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]);
-            let store = Arc::new(dense(&base, levels, order));
-            let stored = nanoseconds(BLOCKS, LOOK_UPS, |k| {
-                black_box(store.sample(&place(k)));
-            });
-            let slope = JointVector::from_slice(&vec![10.0; joints]);
-            let refined = Dataset::refined(Arc::clone(&store), base, None, String::new(), Provenance::default());
-            let field = TorqueField::interpolated(&refined, interpolation, 0.5, &slope).unwrap();
-            let haptics = Haptics::new(field, desktop::proxy(joints), &desktop::haptics(joints)).unwrap();
-            let mut state = haptics.start(&place(0.0)).unwrap();
-            let tick = nanoseconds(BLOCKS, LOOK_UPS, |k| {
-                let inputs = Inputs { position: place(k), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
-                black_box(haptics.tick(&mut state, &inputs));
-            });
-            let points = ((count - 1) << (levels - 1)) + 1;
-            let grid = synthetic::grid(&vec![(-0.6, 1.2 / (points - 1) as f64, points); joints]);
-            let field =
-                TorqueField::interpolated(&synthetic::half_space(grid, 5.0), interpolation, 0.5, &slope).unwrap();
-            let grid = nanoseconds(BLOCKS, LOOK_UPS, |k| {
-                black_box(field.sample(&place(k)));
-            });
-            let [stored, tick, grid] = [stored, tick, grid].map(|time| time - placing);
-            println!("{joints:6}  {order:9?}  {points:10}  {levels:6}  {stored:12.0}  {tick:15.0}  {grid:12.0}");
-        }
+        let base = synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]);
+        let store = Arc::new(dense(&base, levels));
+        let stored = nanoseconds(BLOCKS, LOOK_UPS, |k| {
+            black_box(store.sample(&place(k)));
+        });
+        let slope = JointVector::from_slice(&vec![10.0; joints]);
+        let refined = Dataset::refined(Arc::clone(&store), base, None, String::new(), Provenance::default());
+        let field = TorqueField::interpolated(&refined, Interpolation::Potential, 0.5, &slope).unwrap();
+        let haptics = Haptics::new(field, desktop::proxy(joints), &desktop::haptics(joints)).unwrap();
+        let mut state = haptics.start(&place(0.0)).unwrap();
+        let tick = nanoseconds(BLOCKS, LOOK_UPS, |k| {
+            let inputs = Inputs { position: place(k), age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+            black_box(haptics.tick(&mut state, &inputs));
+        });
+        let points = ((count - 1) << (levels - 1)) + 1;
+        let grid = synthetic::grid(&vec![(-0.6, 1.2 / (points - 1) as f64, points); joints]);
+        let field = TorqueField::interpolated(&synthetic::half_space(grid, 5.0), Interpolation::Potential, 0.5, &slope)
+            .unwrap();
+        let grid = nanoseconds(BLOCKS, LOOK_UPS, |k| {
+            black_box(field.sample(&place(k)));
+        });
+        let [stored, tick, grid] = [stored, tick, grid].map(|time| time - placing);
+        println!("{joints:6}  {points:10}  {levels:6}  {stored:12.0}  {tick:15.0}  {grid:12.0}");
     }
 }
 
@@ -231,7 +227,7 @@ fn main() {
     let mut judges = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
     let mut backend = CpuBackend::new(&model, 0).unwrap();
     let batch = backend.chunk();
-    println!("\norder      base   levels  nodes  by level  bytes  solved  equilibria  seen  unseen  rounds  seconds");
+    println!("\nbase   levels  nodes  by level  bytes  solved  equilibria  seen  unseen  rounds  seconds");
     let dense = |interpolation, spacings: &[f64]| -> Vec<Spent> {
         spacings.iter().map(|spacing| dense_grid(&scene, *spacing, interpolation, &judges[1])).collect()
     };
@@ -239,15 +235,15 @@ fn main() {
         ("dense linear", dense(Interpolation::Linear, &[4.0, 2.0, 1.0, 0.5, 0.4])),
         ("dense potential", dense(Interpolation::Potential, &[4.0, 2.0, 1.4, 1.0, 0.7])),
     ];
-    let mut fill = |order, spacing: f64, levels, aim| {
+    let mut fill = |spacing: f64, levels, aim| {
         let begin = Instant::now();
-        let refine = Refine { model: &model, base: grid(&scene, spacing), levels, order, aim, most: 50_000, batch };
+        let refine = Refine { model: &model, base: grid(&scene, spacing), levels, aim, most: 50_000, batch };
         let refined = refine.fill(&mut judges, &mut backend).unwrap();
         let error = judges[1].relative_error(|q| refined.store.sample(q).torque());
         // In the file: key and mask of a block, numbers, gap and status of a node.
         let bytes = 16 * refined.store.blocks().len() + refined.nodes * (4 * width(refine.base.joints()) + 5);
         println!(
-            "{order:9?}  {spacing:5}  {levels}  {}  {:?}  {bytes}  {}  {}  {:.2} %  {:.2} %  {}  {:.1}",
+            "{spacing:5}  {levels}  {}  {:?}  {bytes}  {}  {}  {:.2} %  {:.2} %  {}  {:.1}",
             refined.nodes,
             refined.by_level,
             refined.solved,
@@ -259,15 +255,9 @@ fn main() {
         );
         (refined.nodes as f64, bytes as f64, error)
     };
-    let names = [
-        (Order::Linear, ["linear, one level", "linear, refined"]),
-        (Order::Potential, ["potential, one level", "potential, refined"]),
-    ];
-    for (order, [even, refined]) in names {
-        // One level, no aim: the uniform grid.
-        rows.push((even, [4.0, 2.0, 1.0, 0.7, 0.5].map(|spacing| fill(order, spacing, 1, f64::INFINITY)).to_vec()));
-        let aims = [8.0, 4.0, 2.0, 1.0, 0.5].map(|times| times * aim);
-        rows.push((refined, aims.map(|aim| fill(order, 4.0, 5, aim)).to_vec()));
-    }
+    // One level, no aim: the uniform grid.
+    let even = [4.0, 2.0, 1.0, 0.7, 0.5].map(|spacing| fill(spacing, 1, f64::INFINITY)).to_vec();
+    let refined = [8.0, 4.0, 2.0, 1.0, 0.5].map(|times| fill(4.0, 5, times * aim)).to_vec();
+    rows.extend([("potential, one level", even), ("potential, refined", refined)]);
     draw(arguments.get(2).map_or("out/store", String::as_str), &rows);
 }

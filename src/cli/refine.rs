@@ -9,9 +9,9 @@ use crate::{
     dataset::{MeasuredError, Provenance, Surface},
     proxy::Chain,
     scene::Scene,
-    store::{Order, Store},
+    store::Store,
     sweep::{
-        Aim, BackendChoice, ChosenBackend, CpuBackend, build_object, check_algorithm, grid_of, order_of,
+        Aim, BackendChoice, ChosenBackend, CpuBackend, build_object, check_algorithm, grid_of,
         refine::{Judge, Refine, Refined},
         sample,
     },
@@ -41,8 +41,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
-    let order = order_of(scene);
-    model.with_tangent = order == Order::Potential;
+    model.with_tangent = true;
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
@@ -52,7 +51,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
         Aim::Absolute(torque) => torque / judges[0].torque(),
     };
     let mut refine =
-        Refine { model: &model, base: grid_of(scene), levels: wanted.levels, order, aim, most: wanted.most, batch: 1 };
+        Refine { model: &model, base: grid_of(scene), levels: wanted.levels, aim, most: wanted.most, batch: 1 };
     let most = uniform(&refine).min(refine.most);
     let mut backend = ChosenBackend::open(backend.for_work(each * most as f64), &model)?;
     refine.batch = backend.chunk();

@@ -1,12 +1,15 @@
 //! The contact torque as a function of configuration: interpolation over the dataset's grid (section 3.1).
 //!
-//! The scene chooses one of two ways ([`Interpolation`]): `linear` (`layered.rs`) interpolates the torque and holds it
-//! behind a boundary layer, `potential` (`potential.rs`) interpolates the energy and takes its gradient; `direct`,
-//! which solves contact while it is felt, has `potential` wherever its solution is late. A refined dataset is
-//! interpolated by its store, in the store's own way (`refined.rs`). All are continuous and without memory. What they
-//! share is here: the cell around q, the fade outside the grid (`dataset/stencil.rs`), what is said of points that were not
-//! computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored
-//! (contact, unconverged, overflowed) and 0 at free points.
+//! The scene chooses the way ([`Interpolation`]): `linear` (`linear.rs`) interpolates the torque and holds it behind a
+//! boundary layer; `potential` (`potential.rs`) interpolates the energy and takes its gradient, over the points of a
+//! uniform grid (`grid_root.rs`) or the nodes of the store that refines one; `direct`, which solves contact while it is
+//! felt, has `potential` wherever its solution is late. All are continuous and without memory. What they share is in
+//! `points.rs`: the fade outside the grid, what is said of points that were not computed or did not converge, and the
+//! contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at
+//! free points.
+//!
+//! Another way is a variant of [`Interpolation`], a file here that implements [`Interpolant`], and its line in
+//! [`TorqueField::interpolated`].
 //!
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped
 //! file, which would end the process when somebody else truncates it.
@@ -16,12 +19,11 @@ mod bernstein;
 pub mod boundary;
 mod error;
 mod flags;
-mod hermite;
-mod layered;
+mod grid_root;
+mod linear;
 mod points;
 mod potential;
 pub mod range;
-mod refined;
 mod slope;
 mod stiffness;
 mod work;
@@ -29,46 +31,38 @@ mod work;
 pub use batch::{BatchError, check_rows, fill_rows};
 pub use error::FieldError;
 pub use flags::Flags;
-pub(crate) use potential::LEAST_ENERGY;
+pub(crate) use grid_root::LEAST_ENERGY;
 pub(crate) use slope::GRADIENT_STEP;
 
 use crate::{
-    JointVector, MAX_JOINTS,
+    JointVector,
     contact::Status,
-    dataset::{Dataset, Grid, Stencil},
+    dataset::{Dataset, Grid},
     scene::Interpolation,
-    store::{Order, Store},
+    store::Store,
 };
-use layered::Layered;
-use points::{Checked, Point};
+use grid_root::GridRoot;
+use linear::Linear;
+use points::Checked;
 use potential::Potential;
 use std::sync::Arc;
-use stiffness::Steepest;
 
 /// The contact torque around one object.
 pub struct TorqueField {
     grid: Grid,
-    source: Source,
-    steepest: Steepest,
-}
-
-/// Source of answers.
-enum Source {
-    Grid(OnGrid),
-    Store(Arc<Store>),
-}
-
-/// Numbers at the points of the grid.
-struct OnGrid {
-    points: Vec<Point>,
+    interpolant: Box<dyn Interpolant>,
     has_energy: bool,
-    interpolant: Interpolant,
+    is_potential: bool,
+    store: Option<Arc<Store>>,
 }
 
-/// The interpolated quantity.
-enum Interpolant {
-    Layered(Layered),
-    Potential(Potential),
+/// A way to interpolate.
+trait Interpolant: Send + Sync {
+    /// [`TorqueField::sample_within`]. Never allocates.
+    fn sample(&self, q: &[f64], horizon: u64) -> (Sample, u32);
+
+    /// [`TorqueField::relative_stiffness`].
+    fn relative_stiffness(&self, slopes: &JointVector) -> f64;
 }
 
 /// The field at one configuration.
@@ -108,14 +102,6 @@ impl Sample {
     }
 }
 
-/// Flags and contact of a cell's corners, whatever is interpolated.
-#[derive(Default)]
-struct Corners {
-    flags: Flags,
-    index: f64,
-    contact_nodes: u32,
-}
-
 impl TorqueField {
     /// The paper's interpolation, [`Interpolation::Linear`], over `dataset`. `threshold`: Ith (1); `slope`: Ks of the
     /// boundary layer, one per joint (N m/rad).
@@ -126,8 +112,7 @@ impl TorqueField {
         Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
     }
 
-    /// Any interpolation over `dataset`; a refined one is interpolated in the way of its store, whatever
-    /// `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
+    /// Any interpolation over `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
     /// mixed derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
@@ -146,18 +131,20 @@ impl TorqueField {
         if slope.len() != grid.joints() || !slope.iter().all(|slope| *slope > 0.0 && slope.is_finite()) {
             return Err(FieldError::Slope(*slope));
         }
-        if let Some(store) = &dataset.refinement {
-            let source = Source::Store(Arc::clone(store));
-            return Ok(Self { grid, source, steepest: Steepest::default() });
-        }
-        let (points, nearest) = points::survey(dataset)?;
-        let data = Checked { dataset, points: &points, nearest: &nearest };
-        let interpolant = match interpolation {
-            Interpolation::Linear => Interpolant::Layered(Layered::linear(&data, threshold, slope)?),
-            Interpolation::Potential | Interpolation::Direct => Interpolant::Potential(Potential::new(&data)?),
+        let interpolant: Box<dyn Interpolant> = match (&dataset.refinement, interpolation) {
+            (Some(store), _) => Box::new(Potential::new(Arc::clone(store), 0.0)),
+            (None, Interpolation::Linear) => Box::new(Linear::new(Checked::new(dataset)?, threshold, slope)?),
+            (None, Interpolation::Potential | Interpolation::Direct) => {
+                Box::new(GridRoot::potential(Checked::new(dataset)?)?)
+            }
         };
-        let on_grid = OnGrid { points, has_energy: dataset.energy.is_some(), interpolant };
-        Ok(Self { grid, source: Source::Grid(on_grid), steepest: Steepest::default() })
+        Ok(Self {
+            grid,
+            interpolant,
+            has_energy: dataset.energy.is_some(),
+            is_potential: dataset.refinement.is_some() || interpolation.is_potential(),
+            store: dataset.refinement.clone(),
+        })
     }
 
     /// Number of joints d.
@@ -175,19 +162,13 @@ impl TorqueField {
     /// Whether the dataset has the energy U.
     #[must_use]
     pub fn has_energy(&self) -> bool {
-        match &self.source {
-            Source::Grid(on_grid) => on_grid.has_energy,
-            Source::Store(_) => true,
-        }
+        self.has_energy
     }
 
     /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid.
     #[must_use]
     pub fn is_potential(&self) -> bool {
-        match &self.source {
-            Source::Grid(on_grid) => matches!(on_grid.interpolant, Interpolant::Potential(_)),
-            Source::Store(store) => store.order() == Order::Potential,
-        }
+        self.is_potential
     }
 
     /// Upper bound of the stiffness of the interpolated torque inside the grid, before any boundary layer, relative to
@@ -198,96 +179,26 @@ impl TorqueField {
     /// for the same slopes or multiples of them.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
-        match &self.source {
-            Source::Grid(OnGrid { interpolant: Interpolant::Layered(layered), .. }) => {
-                layered.relative_stiffness(&self.grid, slopes)
-            }
-            Source::Grid(OnGrid { interpolant: Interpolant::Potential(potential), .. }) => {
-                self.steepest.norm(slopes, 0, || potential.steepest(&self.grid, slopes))
-            }
-            Source::Store(store) => self.steepest.norm(slopes, store.horizon(), || refined::steepest(store, slopes)),
-        }
+        self.interpolant.relative_stiffness(slopes)
     }
 
     /// The field at `q`, one entry per joint. Never allocates; takes the same time wherever `q` is.
     #[must_use]
     pub fn sample(&self, q: &[f64]) -> Sample {
-        let on_grid = match &self.source {
-            Source::Grid(on_grid) => on_grid,
-            Source::Store(store) => return refined::sample(&self.grid, store, q, u64::MAX).0,
-        };
-        let stencil = self.grid.locate(q);
-        match self.joints() {
-            1 => on_grid.sample_joints::<1, 1>(&stencil),
-            2 => on_grid.sample_joints::<2, 4>(&stencil),
-            3 => on_grid.sample_joints::<3, 16>(&stencil),
-            4 => on_grid.sample_joints::<4, 64>(&stencil),
-            5 => on_grid.sample_joints::<5, 256>(&stencil),
-            _ => on_grid.sample_joints::<MAX_JOINTS, 1024>(&stencil),
-        }
+        self.sample_within(q, u64::MAX).0
+    }
+
+    /// The field at `q` of the first `horizon` blocks of a refined dataset's store, and the levels, from the base up,
+    /// whose cell around `q` is whole: one of a uniform grid, which has no blocks. Never allocates.
+    #[must_use]
+    pub fn sample_within(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
+        self.interpolant.sample(q, horizon)
     }
 
     /// The store of a refined dataset.
     #[must_use]
     pub fn store(&self) -> Option<&Store> {
-        match &self.source {
-            Source::Store(store) => Some(store),
-            Source::Grid(_) => None,
-        }
-    }
-
-    /// The field of a refined dataset at `q`, of the first `horizon` blocks of its store, and the levels, from the base
-    /// up, whose cell around `q` is whole. Other fields have no blocks and no levels. Never allocates.
-    #[must_use]
-    pub fn sample_within(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
-        match &self.source {
-            Source::Store(store) => refined::sample(&self.grid, store, q, horizon),
-            Source::Grid(_) => (self.sample(q), 0),
-        }
-    }
-}
-
-impl OnGrid {
-    /// The field in the cell of `stencil`. `N = 4^(D-1)`.
-    fn sample_joints<const D: usize, const N: usize>(&self, stencil: &Stencil) -> Sample {
-        let mut corners = Corners::default();
-        let mut heaviest = 0.0;
-        for (point, weight) in stencil.corners().filter(|(_, weight)| *weight > 0.0) {
-            let corner = self.points[point];
-            corners.flags |= corner.flags;
-            corners.index += if corner.touching { weight } else { 0.0 };
-            if corner.in_contact && weight > heaviest {
-                (corners.contact_nodes, heaviest) = (corner.contacts, weight);
-            }
-        }
-        if stencil.fade < 1.0 {
-            corners.flags |= Flags::OUTSIDE;
-        }
-        let (mut torque, energy, inside, share);
-        match &self.interpolant {
-            Interpolant::Layered(layered) => {
-                let at = layered.at::<D>(stencil);
-                (torque, energy, inside, share) = (at.torque, at.energy, at.depth > 0.0, at.held);
-                if at.held < 1.0 {
-                    corners.flags |= Flags::LAYER;
-                }
-            }
-            Interpolant::Potential(potential) => {
-                let at = potential.at::<D, N>(stencil);
-                (torque, energy, inside, share) = (at.torque, at.energy, at.contact, at.share);
-            }
-        }
-        torque.iter_mut().for_each(|tau| *tau *= stencil.fade);
-        let contact = inside && stencil.fade > 0.0;
-        Sample {
-            torque,
-            index: corners.index,
-            contact,
-            contact_nodes: if contact { corners.contact_nodes } else { 0 },
-            energy,
-            share: share * stencil.fade,
-            flags: corners.flags,
-        }
+        self.store.as_deref()
     }
 }
 

@@ -1,10 +1,11 @@
 //! The facts that a field has at each grid point beside numbers that are interpolated, and those where nothing was
 //! computed.
 
-use super::{FieldError, Flags};
+use super::{FieldError, Flags, Sample};
 use crate::{
+    JointVector,
     contact::Status,
-    dataset::{Dataset, Grid},
+    dataset::{Dataset, Grid, Stencil},
     input::GREATEST_INPUT,
     joint_matrix,
 };
@@ -50,15 +51,88 @@ impl Point {
     }
 }
 
+/// What the points around a configuration tell beside numbers that are interpolated.
+pub(super) struct Around {
+    /// One inside the grid, falling to zero one cell outside.
+    pub fade: f64,
+    /// Factor on interpolated contact forces inside the grid, 0 to 1.
+    pub share: f64,
+    pub flags: Flags,
+    /// Interpolated contact index, 0 to 1.
+    pub index: f64,
+    /// Object nodes in contact at the heaviest corner in contact.
+    pub contact_nodes: u32,
+}
+
+impl Around {
+    /// What `points` tell of the configuration of `stencil`.
+    pub fn of(points: &[Point], stencil: &Stencil) -> Self {
+        let flags = Flags::empty();
+        let mut around = Self { fade: stencil.fade, share: 1.0, flags, index: 0.0, contact_nodes: 0 };
+        let mut heaviest = 0.0;
+        for (point, weight) in stencil.corners().filter(|(_, weight)| *weight > 0.0) {
+            let corner = points[point];
+            around.flags |= corner.flags;
+            around.index += if corner.touching { weight } else { 0.0 };
+            if corner.in_contact && weight > heaviest {
+                (around.contact_nodes, heaviest) = (corner.contacts, weight);
+            }
+        }
+        around
+    }
+
+    /// The field where `torque` and `energy` were interpolated, beyond the object's boundary if `inside`.
+    pub fn sample(self, mut torque: JointVector, energy: f64, inside: bool) -> Sample {
+        torque.iter_mut().for_each(|tau| *tau *= self.fade);
+        let contact = inside && self.fade > 0.0;
+        let mut flags = self.flags;
+        flags.set(Flags::OUTSIDE, self.fade < 1.0);
+        Sample {
+            torque,
+            index: self.index,
+            contact,
+            contact_nodes: if contact { self.contact_nodes } else { 0 },
+            energy,
+            share: self.share * self.fade,
+            flags,
+        }
+    }
+}
+
 /// A dataset whose columns have been checked, point by point.
 pub(super) struct Checked<'a> {
     pub dataset: &'a Dataset,
-    pub points: &'a [Point],
+    pub points: Vec<Point>,
     /// For each point the nearest one that was computed; itself if it was.
-    pub nearest: &'a [usize],
+    pub nearest: Vec<usize>,
 }
 
-impl Checked<'_> {
+impl<'a> Checked<'a> {
+    /// Checks `dataset`.
+    pub fn new(dataset: &'a Dataset) -> Result<Self, FieldError> {
+        let (grid, count) = (&dataset.grid, dataset.grid.points());
+        expect("torque", count.saturating_mul(grid.joints()), dataset.torque.len())?;
+        expect("status", count, dataset.status.len())?;
+        if let Some(energy) = &dataset.energy {
+            expect("energy", count, energy.len())?;
+        }
+        if let Some(tangent) = &dataset.tangent {
+            expect("tangent", count.saturating_mul(joint_matrix::entries(grid.joints())), tangent.len())?;
+        }
+        if let Some(gap) = &dataset.gap {
+            expect("gap", count, gap.len())?;
+        }
+        if let Some(contacts) = &dataset.contacts {
+            expect("contact offsets", count + 1, contacts.offsets.len())?;
+        }
+        let mut points: Vec<Point> = (0..count).map(|point| Point::of(dataset, point)).collect();
+        let nearest = nearest_present(grid, &points).ok_or(FieldError::Empty)?;
+        for (point, &source) in nearest.iter().enumerate() {
+            points[point].touching = points[source].in_contact;
+        }
+        Ok(Self { dataset, points, nearest })
+    }
+
     /// tau of `point`, or of the nearest that was computed; zeros where that is free.
     pub fn torque<'b>(&'b self, point: usize, zeros: &'b [f64]) -> Result<&'b [f64], FieldError> {
         let source = self.nearest[point];
@@ -81,31 +155,6 @@ impl Checked<'_> {
         plausible("energy", source, energy)?;
         Ok(energy)
     }
-}
-
-/// Points of `dataset`, and for each the nearest one that was computed.
-pub(super) fn survey(dataset: &Dataset) -> Result<(Vec<Point>, Vec<usize>), FieldError> {
-    let (grid, count) = (&dataset.grid, dataset.grid.points());
-    expect("torque", count.saturating_mul(grid.joints()), dataset.torque.len())?;
-    expect("status", count, dataset.status.len())?;
-    if let Some(energy) = &dataset.energy {
-        expect("energy", count, energy.len())?;
-    }
-    if let Some(tangent) = &dataset.tangent {
-        expect("tangent", count.saturating_mul(joint_matrix::entries(grid.joints())), tangent.len())?;
-    }
-    if let Some(gap) = &dataset.gap {
-        expect("gap", count, gap.len())?;
-    }
-    if let Some(contacts) = &dataset.contacts {
-        expect("contact offsets", count + 1, contacts.offsets.len())?;
-    }
-    let mut points: Vec<Point> = (0..count).map(|point| Point::of(dataset, point)).collect();
-    let nearest = nearest_present(grid, &points).ok_or(FieldError::Empty)?;
-    for (point, &source) in nearest.iter().enumerate() {
-        points[point].touching = points[source].in_contact;
-    }
-    Ok((points, nearest))
 }
 
 fn expect(column: &'static str, expected: usize, found: usize) -> Result<(), FieldError> {

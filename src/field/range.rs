@@ -20,7 +20,7 @@
 
 use super::{
     FieldError,
-    points::{self, Generations, plausible},
+    points::{Checked, Generations, plausible},
 };
 use crate::{
     JointVector, MAX_JOINTS,
@@ -111,7 +111,7 @@ impl HaptizedRange {
         }
         let is_known = dataset.status.iter().any(|&number| number != Status::Outside as u8);
         if open.contains(&true) && (is_known || dataset.refinement.is_none()) {
-            let (points, nearest) = points::survey(dataset)?;
+            let data = Checked::new(dataset)?;
             range.beyond = Some(match &dataset.gap {
                 Some(gap) => {
                     let clearance = |(point, &gap): (usize, &f32)| {
@@ -128,7 +128,7 @@ impl HaptizedRange {
                     Beyond { open, clearances, levers, object: Surroundings::new(dataset, chain) }
                 }
                 None => {
-                    let steps = Generations::new(grid, |point| points[nearest[point]].in_contact).steps;
+                    let steps = Generations::new(grid, |point| data.points[data.nearest[point]].in_contact).steps;
                     let mut levers = JointVector::zeros(grid.joints());
                     levers.iter_mut().zip(&grid.axes).for_each(|(lever, axis)| *lever = 1.0 / axis.step);
                     let clearances = steps.into_iter().map(|steps| steps as f32).collect();

@@ -3,6 +3,7 @@
 use super::*;
 use crate::field::synthetic::{grid, half_space};
 use crate::{
+    MAX_JOINTS,
     contact::Status,
     joint_matrix::{JointMatrix, add_symmetric},
 };

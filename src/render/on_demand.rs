@@ -9,11 +9,11 @@ use crate::{
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{Interpolation, Scene, SceneError},
-    store::{Order, Space, SpaceError, Store, check_memory},
+    store::{Space, SpaceError, Store, check_memory},
     sweep::{
         CpuBackend, NoEnergy, SceneObjectError,
         ahead::{Ahead, Follower, Solution, Solved, Whereabouts, follow},
-        build_object, check_algorithm, grid_of, order_of, sample, thin_parts,
+        build_object, check_algorithm, grid_of, sample, thin_parts,
     },
 };
 use std::{
@@ -133,11 +133,11 @@ impl OnDemand {
         let grid = grid_of(&scene);
         check_memory(&grid).map_err(OnDemandError::Memory)?;
         let provenance = CpuBackend::provenance(&scene);
-        let mut store = Store::new(Space::new(&grid, levels)?, order_of(&scene), 0);
+        let mut store = Store::new(Space::new(&grid, levels)?, 0);
         if file.exists() {
             let earlier = Dataset::load(file)?;
             let same_scene = earlier.scene == scene.text;
-            let is_alike = |found: &Store| found.space() == store.space() && found.order() == store.order();
+            let is_alike = |found: &Store| found.space() == store.space();
             let found = earlier.refinement.filter(|found| same_scene && is_alike(found));
             store = found.and_then(Arc::into_inner).ok_or_else(|| OnDemandError::Another(file.into()))?;
         }
@@ -218,7 +218,7 @@ impl OnDemand {
                     return Done::default();
                 }
             };
-            model.with_tangent = this.store.order() == Order::Potential;
+            model.with_tangent = true;
             let ahead = Ahead::new(&model, Arc::clone(&this.store));
             ahead.prepare(&start, this.threads, LONGEST_START.saturating_sub(began.elapsed()));
             ends.serve(&model, &ahead, &raised, &report);

@@ -148,10 +148,20 @@ impl Interpolation {
     /// All between the points of a grid, from the roughest on.
     pub const ALL: [Self; 2] = [Self::Linear, Self::Potential];
 
+    /// All that a scene may name.
+    pub const NAMED: [Self; 3] = [Self::Linear, Self::Potential, Self::Direct];
+
     /// The one of [`Interpolation::ALL`] by which a dataset answers where the scene names this one.
     #[must_use]
     pub fn in_a_dataset(self) -> Self {
         if self == Self::Direct { Self::Potential } else { self }
+    }
+
+    /// Whether the torque is the gradient of an interpolated energy, which a dataset must hold; a boundary layer limits
+    /// the others'.
+    #[must_use]
+    pub fn is_potential(self) -> bool {
+        self.in_a_dataset() == Self::Potential
     }
 
     /// As the scene names it.

@@ -142,8 +142,7 @@ impl Scene {
     /// Whether the loop interpolates torque with its tangent d tau/d q, so that each equilibrium is to come with it.
     #[must_use]
     pub fn uses_tangent(&self) -> bool {
-        matches!(self.haptics.interpolation, Interpolation::Potential | Interpolation::Direct)
-            && self.contact.algorithm == Algorithm::Energy
+        self.haptics.interpolation.is_potential() && self.contact.algorithm == Algorithm::Energy
     }
 
     /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene

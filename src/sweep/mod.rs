@@ -54,7 +54,7 @@ pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use lowest::Lowered;
 pub use measured::MOST_CONFIGURATIONS;
 pub use merge::{Merge, MergeError, Merged};
-pub use node::{NoEnergy, check_algorithm, order_of};
+pub use node::{NoEnergy, check_algorithm};
 pub(crate) use pilot::FARTHEST_EXTRAPOLATION;
 pub use pilot::{Aim, Choice, Cost, Pilot, PilotError, Prospect, Trial};
 pub use plan::{Plan, ShardCost};

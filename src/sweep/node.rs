@@ -22,9 +22,9 @@ use crate::{
     contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
     field::{GRADIENT_STEP, LEAST_ENERGY},
     joint_matrix,
-    scene::{Algorithm, Interpolation, Scene},
+    scene::{Algorithm, Scene},
     store::{
-        Order, Space,
+        Space,
         record::{mixed, slope, width},
         root_of,
     },
@@ -59,12 +59,6 @@ pub struct NoEnergy;
 /// [`NoEnergy`] unless its algorithm is [`Algorithm::Energy`].
 pub fn check_algorithm(scene: &Scene) -> Result<(), NoEnergy> {
     if scene.contact.algorithm == Algorithm::Energy { Ok(()) } else { Err(NoEnergy) }
-}
-
-/// Returns how a store is to interpolate that is filled for `scene`: as the scene asks for, where a store can.
-#[must_use]
-pub fn order_of(scene: &Scene) -> Order {
-    if scene.haptics.interpolation == Interpolation::Linear { Order::Linear } else { Order::Potential }
 }
 
 /// A solved node.

@@ -267,8 +267,5 @@ fn note(ui: &mut Ui, text: String) -> Response {
 
 /// The column that `interpolation` needs and `dataset` lacks.
 fn lacking(interpolation: Interpolation, dataset: &Dataset) -> Option<&'static str> {
-    match interpolation {
-        Interpolation::Linear => None,
-        Interpolation::Potential | Interpolation::Direct => dataset.energy.is_none().then_some("energy"),
-    }
+    (interpolation.is_potential() && dataset.energy.is_none()).then_some("energy")
 }

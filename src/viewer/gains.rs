@@ -45,7 +45,7 @@ const GAINS: [Gain; 4] = [
         of: |gains| &mut gains.boundary_slope,
         bound: |gains, joint| Some(passivity::greatest_slope(gains, joint)),
         positive: true,
-        counts: |interpolation| !matches!(interpolation, Interpolation::Potential | Interpolation::Direct),
+        counts: |interpolation| !interpolation.is_potential(),
     },
     Gain {
         name: "Coupling damping Bvc",

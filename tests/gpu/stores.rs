@@ -6,10 +6,7 @@ use haptize::{
     dataset::Dataset,
     gpu::GpuSolver,
     scene::Scene,
-    store::{
-        Order,
-        record::{slope, width},
-    },
+    store::record::{slope, width},
     sweep::{
         Backend, CpuBackend, grid_of,
         refine::{Judge, Refine, Refined},
@@ -27,8 +24,7 @@ const RECORD_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 /// Fills both levels of a store, whole, and prints how fast.
 fn fill<B: Backend>(name: &str, scene: &Scene, model: &Model<'_>, batch: usize, backend: &mut B) -> Refined {
     let mut judges = [1, 2].map(|seed| Judge::new(scene, model, seed, 50).unwrap());
-    let (base, order) = (grid_of(scene), Order::Potential);
-    let refine = Refine { model, base, levels: 2, order, aim: f64::MIN_POSITIVE, most: 10_000, batch };
+    let refine = Refine { model, base: grid_of(scene), levels: 2, aim: f64::MIN_POSITIVE, most: 10_000, batch };
     let start = Instant::now();
     let refined = refine.fill(&mut judges, backend).unwrap();
     println!(

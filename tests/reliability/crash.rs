@@ -9,7 +9,7 @@ use crate::{
 };
 use haptize::{
     dataset::{Axis, Grid, Provenance},
-    store::{Order, Space, Store},
+    store::{Space, Store},
 };
 use std::{
     path::Path,
@@ -345,7 +345,7 @@ fn other_commands_without_memory_end_with_an_error_of_one_json_object() {
     // Some kilobytes whose base has eight million points.
     let axis = |name: &str| Axis { name: name.into(), unit: "rad".into(), start: 0.0, step: 0.01, count: 200 };
     let grid = Grid { axes: ["a", "b", "c"].map(axis).to_vec() };
-    let store = Store::new(Space::new(&grid, 2).unwrap(), Order::Potential, 0);
+    let store = Store::new(Space::new(&grid, 2).unwrap(), 0);
     store.save(&grid, None, "", &Provenance::default(), &folder.join("sparse.haptize")).unwrap();
     assert!(std::fs::metadata(folder.join("sparse.haptize")).unwrap().len() < 20_000);
     let sphere = |edge: &str, springs: &str| {

@@ -3,7 +3,7 @@
 use crate::fixture::{blocks, nodes, space};
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use haptize::store::{
-    Nodes, Order, Place, Store,
+    Nodes, Place, Store,
     record::{slope, width},
 };
 use std::{
@@ -25,9 +25,9 @@ fn affine(q: &[f64]) -> Vec<f64> {
 
 #[test]
 fn readers_see_whole_blocks_beside_writers_and_never_allocate() {
-    for (joints, order) in [(3, Order::Potential), (3, Order::Linear), (5, Order::Potential)] {
+    for joints in [3, 5] {
         let space = space(joints, 2);
-        let store = Store::new(space.clone(), order, blocks(&space, 0).len() + blocks(&space, 1).len());
+        let store = Store::new(space.clone(), blocks(&space, 0).len() + blocks(&space, 1).len());
         let make = |level, block: &Place| nodes(&space, level, block, |_| true, affine);
         blocks(&space, 0).iter().for_each(|block| store.publish(0, block, make(0, block)).unwrap());
         let done = AtomicBool::new(false);
@@ -83,7 +83,7 @@ fn a_list_of_blocks_beside_writers_has_all_on_which_each_rests() {
     let mut beside = 0;
     // Again and again, until a list was taken while blocks were published.
     for _ in 0..2000 {
-        let store = Store::new(space.clone(), Order::Linear, all.len());
+        let store = Store::new(space.clone(), all.len());
         thread::scope(|scope| {
             let writer = scope.spawn(|| {
                 for (level, block) in &all {

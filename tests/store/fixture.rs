@@ -4,7 +4,7 @@ use haptize::{
     MAX_JOINTS,
     contact::Status,
     dataset::{Axis, Grid},
-    store::{Nodes, Order, Place, Space, Store, record::width},
+    store::{Nodes, Place, Space, Store, record::width},
 };
 
 /// Numbers in -1..1, the same every time.
@@ -74,18 +74,11 @@ pub fn nodes(
 
 /// A store in which blocks are there with probability `share`, as far as their foundations allow, and nodes in them,
 /// too.
-pub fn store(
-    joints: usize,
-    levels: u32,
-    order: Order,
-    share: f64,
-    seed: u64,
-    mut record: impl FnMut(&[f64]) -> Vec<f64>,
-) -> Store {
+pub fn store(joints: usize, levels: u32, share: f64, seed: u64, mut record: impl FnMut(&[f64]) -> Vec<f64>) -> Store {
     let mut random = Random(seed);
     let space = space(joints, levels);
     let most = (0..levels).map(|level| blocks(&space, level).len()).sum();
-    let store = Store::new(space.clone(), order, most);
+    let store = Store::new(space.clone(), most);
     for level in 0..levels {
         for block in blocks(&space, level) {
             let rests = store.foundation(level, &block).all(|(below, place)| store.get(below, &place).is_some());

@@ -7,7 +7,7 @@ use haptize::{
     field::TorqueField,
     scene::Interpolation,
     store::{
-        Order, Place, Root, Space, Store,
+        Place, Root, Space, Store,
         record::{mixed, slope, width},
     },
 };
@@ -56,17 +56,15 @@ fn greatest_jump(store: &Store, joints: usize, mut sample: impl FnMut(&[f64]) ->
 }
 
 #[test]
-fn linear_is_continuous_and_potential_smooth_at_every_border_of_blocks_and_levels() {
+fn it_is_smooth_at_every_border_of_blocks_and_levels() {
     for joints in 1..=MAX_JOINTS {
-        for order in [Order::Linear, Order::Potential] {
-            for seed in 0..3 {
-                let store = store(joints, levels(joints), order, 0.6, seed, noise(joints, 99 + seed));
-                let [value, slope] = greatest_jump(&store, joints, |q| store.sample(q));
-                // Both sides are 2 BESIDE apart: of functions of order one, whose slopes are hardly over a hundred a
-                // step.
-                assert!(value < ROUNDING, "{joints} joints, {order:?}, seed {seed}: value jumps by {value}");
-                assert!(slope < 10.0 * ROUNDING, "{joints} joints, {order:?}, seed {seed}: slopes jump by {slope}");
-            }
+        for seed in 0..3 {
+            let store = store(joints, levels(joints), 0.6, seed, noise(joints, 99 + seed));
+            let [value, slope] = greatest_jump(&store, joints, |q| store.sample(q));
+            // Both sides are 2 BESIDE apart: of functions of order one, whose slopes are hardly over a hundred a
+            // step.
+            assert!(value < ROUNDING, "{joints} joints, seed {seed}: value jumps by {value}");
+            assert!(slope < 10.0 * ROUNDING, "{joints} joints, seed {seed}: slopes jump by {slope}");
         }
     }
 }
@@ -75,7 +73,7 @@ fn linear_is_continuous_and_potential_smooth_at_every_border_of_blocks_and_level
 fn the_comparison_sees_a_step_between_cells() {
     // A reader whose value changes from cell to cell of the finest level.
     for joints in 1..=MAX_JOINTS {
-        let store = store(joints, levels(joints), Order::Potential, 0.6, 0, noise(joints, 99));
+        let store = store(joints, levels(joints), 0.6, 0, noise(joints, 99));
         let finest = store.space().levels() - 1;
         let [value, _] = greatest_jump(&store, joints, |q| {
             let mut root = store.sample(q);
@@ -89,13 +87,13 @@ fn the_comparison_sees_a_step_between_cells() {
 
 #[test]
 fn the_slopes_are_the_gradient_and_so_the_field_has_no_curl() {
-    let differs = |joints: usize, order: Order| {
-        let store = store(joints, levels(joints), order, 0.6, 5, noise(joints, 3));
+    let differs = |joints: usize, seed: u64| {
+        let [store, other] = [3, seed].map(|seed| store(joints, levels(joints), 0.6, 5, noise(joints, seed)));
         let mut random = Random(11);
         let mut greatest = 0.0_f64;
         for _ in 0..200 {
             let q: Vec<f64> = (0..joints).map(|a| -0.2 + (1.0 + 0.9 * random.next()) * step(a)).collect();
-            let here = store.sample(&q);
+            let here = other.sample(&q);
             for a in 0..joints {
                 let [before, after] = [-1e-4, 1e-4].map(|h| {
                     let mut q = q.clone();
@@ -109,37 +107,35 @@ fn the_slopes_are_the_gradient_and_so_the_field_has_no_curl() {
     };
     for joints in 1..=MAX_JOINTS {
         // Third derivatives of order 10^3, and kinks of the curvature, by steps of 1e-4.
-        let potential = differs(joints, Order::Potential);
+        let potential = differs(joints, 3);
         assert!(potential < 2e-2, "{joints} joints: {potential}");
-        // Linear interpolation of a value and a gradient that do not belong together: the comparison can fail.
-        assert!(differs(joints, Order::Linear) > 0.2, "{joints} joints");
+        // A value and a gradient that do not belong together: the comparison can fail.
+        assert!(differs(joints, 4) > 0.2, "{joints} joints");
     }
 }
 
 #[test]
 fn every_node_is_met_by_value_slopes_and_mixed_derivatives() {
     for joints in 1..=MAX_JOINTS {
-        for order in [Order::Linear, Order::Potential] {
-            let store = store(joints, levels(joints), order, 0.6, 21, noise(joints, 4));
-            let space = store.space();
-            let mut seen = 0;
-            for (key, block) in store.blocks() {
-                let (level, place) = space.block(key).unwrap();
-                let records = block.nodes().records.chunks_exact(width(joints));
-                for (at, record) in block.nodes().places().zip(records) {
-                    let node = space.nodes(level, &place).find(|(p, _)| *p == at).unwrap().1;
-                    let q = space.configuration(level, &node);
-                    let root = store.sample(&q);
-                    assert!((root.value - f64::from(record[0])).abs() < ROUNDING, "{joints} {order:?} {level}");
-                    for a in 0..joints {
-                        let error = (root.slopes[a] - f64::from(record[slope(a)])).abs() * step(a);
-                        assert!(error < 10.0 * ROUNDING, "{joints} {order:?} {level} {a}: {error}");
-                    }
-                    seen += 1;
+        let store = store(joints, levels(joints), 0.6, 21, noise(joints, 4));
+        let space = store.space();
+        let mut seen = 0;
+        for (key, block) in store.blocks() {
+            let (level, place) = space.block(key).unwrap();
+            let records = block.nodes().records.chunks_exact(width(joints));
+            for (at, record) in block.nodes().places().zip(records) {
+                let node = space.nodes(level, &place).find(|(p, _)| *p == at).unwrap().1;
+                let q = space.configuration(level, &node);
+                let root = store.sample(&q);
+                assert!((root.value - f64::from(record[0])).abs() < ROUNDING, "{joints} {level}");
+                for a in 0..joints {
+                    let error = (root.slopes[a] - f64::from(record[slope(a)])).abs() * step(a);
+                    assert!(error < 10.0 * ROUNDING, "{joints} {level} {a}: {error}");
                 }
+                seen += 1;
             }
-            assert!(seen > 10);
         }
+        assert!(seen > 10);
     }
 }
 
@@ -169,22 +165,19 @@ fn polynomial(q: &[f64], cubic: bool) -> Vec<f64> {
 #[test]
 fn polynomials_are_met_everywhere_whatever_nodes_there_are() {
     for joints in 1..=MAX_JOINTS {
-        for order in [Order::Linear, Order::Potential] {
-            let cubic = order == Order::Potential;
-            let store = store(joints, levels(joints), order, 0.5, 8, |q| polynomial(q, cubic));
-            let mut random = Random(2);
-            for _ in 0..200 {
-                let q: Vec<f64> = (0..joints).map(|a| -0.2 + (1.0 + 0.99 * random.next()) * step(a)).collect();
-                let (root, exact) = (store.sample(&q), polynomial(&q, cubic));
-                assert!((root.value - exact[0]).abs() < 10.0 * ROUNDING, "{joints} {order:?}");
-                for a in 0..joints {
-                    assert!((root.slopes[a] - exact[slope(a)]).abs() < 100.0 * ROUNDING, "{joints} {order:?} {a}");
-                }
+        let store = store(joints, levels(joints), 0.5, 8, |q| polynomial(q, true));
+        let mut random = Random(2);
+        for _ in 0..200 {
+            let q: Vec<f64> = (0..joints).map(|a| -0.2 + (1.0 + 0.99 * random.next()) * step(a)).collect();
+            let (root, exact) = (store.sample(&q), polynomial(&q, true));
+            assert!((root.value - exact[0]).abs() < 10.0 * ROUNDING, "{joints}");
+            for a in 0..joints {
+                assert!((root.slopes[a] - exact[slope(a)]).abs() < 100.0 * ROUNDING, "{joints} {a}");
             }
-            // Other polynomials are not met.
-            let other = polynomial(&vec![0.05; joints], !cubic);
-            assert!((store.sample(&vec![0.05; joints]).value - other[0]).abs() > 1e-3);
         }
+        // Other polynomials are not met.
+        let other = polynomial(&vec![0.05; joints], false);
+        assert!((store.sample(&vec![0.05; joints]).value - other[0]).abs() > 1e-3);
     }
 }
 
@@ -196,20 +189,20 @@ fn a_wrong_mixed_derivative_is_seen_between_the_nodes() {
         record[mixed(1, 0)] *= 3.0;
         record
     };
-    let right = store(joints, 1, Order::Potential, 0.5, 8, |q| polynomial(q, true));
-    let wrong = store(joints, 1, Order::Potential, 0.5, 8, wrong);
+    let right = store(joints, 1, 0.5, 8, |q| polynomial(q, true));
+    let wrong = store(joints, 1, 0.5, 8, wrong);
     let q: Vec<f64> = (0..joints).map(|a| -0.2 + 2.25 * step(a)).collect();
     assert!((right.sample(&q).value - wrong.sample(&q).value).abs() > 10.0 * ROUNDING);
 }
 
 #[test]
 fn beyond_the_grid_and_what_is_no_number_is_answered_at_the_border() {
-    let store = store(3, 3, Order::Potential, 0.6, 1, noise(3, 1));
+    let store = store(3, 3, 0.6, 1, noise(3, 1));
     let corner = store.sample(&store.space().configuration(0, &store.space().last(0)));
     assert_eq!(store.sample(&[9.0, 1e300, f64::INFINITY]), corner);
     let first = store.sample(&store.space().configuration(0, &[0; MAX_JOINTS]));
     assert_eq!(store.sample(&[f64::NAN, -9.0, f64::NEG_INFINITY]), first);
-    let empty = Store::new(space(3, 2), Order::Linear, 8);
+    let empty = Store::new(space(3, 2), 8);
     let root = empty.sample(&[0.0; 3]);
     assert_eq!((root.value, root.levels), (0.0, 0));
     assert_eq!(blocks(&space(3, 2), 0).len(), 8);
@@ -233,34 +226,27 @@ fn steepness(store: &Store, q: &[f64]) -> f64 {
 #[test]
 fn the_torque_is_nowhere_steeper_than_the_bound_on_which_gains_rest() {
     for (joints, samples) in [(1, 20_000), (2, 20_000), (3, 20_000), (4, 3000)] {
-        for order in [Order::Linear, Order::Potential] {
-            for seed in 0..3 {
-                let store = Arc::new(store(joints, levels(joints).min(3), order, 0.6, seed, noise(joints, 31 + seed)));
-                let count = store.space().last(0)[0] as usize + 1;
-                let axis = |a: usize| Axis {
-                    name: format!("joint {a}"),
-                    unit: "rad".into(),
-                    start: -0.2,
-                    step: step(a),
-                    count,
-                };
-                let grid = Grid { axes: (0..joints).map(axis).collect() };
-                let text = "name = \"steep\"".into();
-                let data = Dataset::refined(Arc::clone(&store), grid, None, text, Provenance::default());
-                let ones = JointVector::from_slice(&vec![1.0; joints]);
-                let field = TorqueField::interpolated(&data, Interpolation::Potential, 0.5, &ones).unwrap();
-                let bound = field.relative_stiffness(&ones);
-                let mut random = Random(5);
-                let mut steepest = 0.0_f64;
-                for _ in 0..samples {
-                    let place = |a: usize| -0.2 + step(a) * (count - 1) as f64 * (0.5 + 0.4999 * random.next());
-                    steepest = steepest.max(steepness(&store, &(0..joints).map(place).collect::<Vec<_>>()));
-                }
-                assert!(steepest <= bound * (1.0 + 1e-5), "{joints} joints, {order:?}: {steepest} beyond {bound}");
-                // The bound is of use: looser with each joint; of four, these places do not find the steepest.
-                let looser = 2.0 * f64::from(1 << joints);
-                assert!(joints > 3 || bound < looser * steepest, "{joints}, {order:?}: {steepest}, {bound}");
+        for seed in 0..3 {
+            let store = Arc::new(store(joints, levels(joints).min(3), 0.6, seed, noise(joints, 31 + seed)));
+            let count = store.space().last(0)[0] as usize + 1;
+            let axis =
+                |a: usize| Axis { name: format!("joint {a}"), unit: "rad".into(), start: -0.2, step: step(a), count };
+            let grid = Grid { axes: (0..joints).map(axis).collect() };
+            let text = "name = \"steep\"".into();
+            let data = Dataset::refined(Arc::clone(&store), grid, None, text, Provenance::default());
+            let ones = JointVector::from_slice(&vec![1.0; joints]);
+            let field = TorqueField::interpolated(&data, Interpolation::Potential, 0.5, &ones).unwrap();
+            let bound = field.relative_stiffness(&ones);
+            let mut random = Random(5);
+            let mut steepest = 0.0_f64;
+            for _ in 0..samples {
+                let place = |a: usize| -0.2 + step(a) * (count - 1) as f64 * (0.5 + 0.4999 * random.next());
+                steepest = steepest.max(steepness(&store, &(0..joints).map(place).collect::<Vec<_>>()));
             }
+            assert!(steepest <= bound * (1.0 + 1e-5), "{joints} joints: {steepest} beyond {bound}");
+            // The bound is of use: looser with each joint; of four, these places do not find the steepest.
+            let looser = 2.0 * f64::from(1 << joints);
+            assert!(joints > 3 || bound < looser * steepest, "{joints}: {steepest}, {bound}");
         }
     }
 }
@@ -271,7 +257,7 @@ fn whole(joints: usize, count: usize, mut record: impl FnMut(&[f64]) -> Vec<f64>
     let grid = Grid { axes: (0..joints).map(axis).collect() };
     let space = Space::new(&grid, 1).unwrap();
     let places = blocks(&space, 0);
-    let store = Store::new(space, Order::Potential, places.len());
+    let store = Store::new(space, places.len());
     for place in places {
         store.publish(0, &place, nodes(store.space(), 0, &place, |_| true, &mut record)).unwrap();
     }
@@ -335,7 +321,7 @@ fn the_bound_of_a_store_that_grows_is_that_of_what_there_is() {
     let axis = |a: usize| Axis { name: format!("joint {a}"), unit: "rad".into(), start: -0.2, step: step(a), count: 4 };
     let grid = Grid { axes: (0..joints).map(axis).collect() };
     let space = Space::new(&grid, 2).unwrap();
-    let store = Arc::new(Store::new(space.clone(), Order::Potential, 64));
+    let store = Arc::new(Store::new(space.clone(), 64));
     let publish = |level: u32, place: &Place, record: &mut dyn FnMut(&[f64]) -> Vec<f64>| {
         store.publish(level, place, nodes(&space, level, place, |_| true, record)).unwrap();
     };

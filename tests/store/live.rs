@@ -15,7 +15,7 @@ use haptize::{
         setup::Setup,
     },
     scene::Waypoint,
-    store::{Order, Space, Store},
+    store::{Space, Store},
     sweep::{
         ahead::{Ahead, Follower, Whereabouts},
         grid_of,
@@ -46,7 +46,7 @@ impl World {
     }
 
     fn store(&self) -> Arc<Store> {
-        Arc::new(Store::new(Space::new(&grid_of(&self.scene), LEVELS).unwrap(), Order::Potential, 40_000))
+        Arc::new(Store::new(Space::new(&grid_of(&self.scene), LEVELS).unwrap(), 40_000))
     }
 
     fn dataset(&self, store: &Arc<Store>) -> Dataset {
@@ -249,10 +249,10 @@ fn a_solution_followed_is_followed_by_its_tangent_to_second_order() {
 }
 
 #[test]
-fn a_scene_is_explored_for_its_own_interpolation() {
+fn a_scene_is_explored_whatever_its_interpolation() {
     let folder = tempfile::tempdir().unwrap();
     let text = include_str!("../scenes/small.toml");
-    for (name, order) in [("linear", Order::Linear), ("potential", Order::Potential), ("direct", Order::Potential)] {
+    for name in ["linear", "potential", "direct"] {
         let path = folder.path().join(name).with_extension("toml");
         std::fs::write(&path, format!("{text}\n[haptics]\ninterpolation = \"{name}\"\n")).unwrap();
         let kept = folder.path().join(name).with_extension("haptize");
@@ -261,7 +261,7 @@ fn a_scene_is_explored_for_its_own_interpolation() {
         let (_, exploration) = on_demand.begin(&start).unwrap();
         assert!(exploration.end().unwrap().solved.nodes > 0, "{name}");
         let dataset = on_demand.dataset();
-        assert_eq!(dataset.refinement.as_ref().unwrap().order(), order, "{name}");
+        assert!(dataset.refinement.is_some(), "{name}");
         // What was kept goes on with the same scene.
         dataset.save(&kept).unwrap();
         assert!(OnDemand::open(&path, &kept, 2, Some(1)).is_ok(), "{name}");

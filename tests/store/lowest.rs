@@ -4,7 +4,7 @@ use super::world::World;
 use haptize::{
     contact::Status,
     dataset::Dataset,
-    store::{Order, Space, Store},
+    store::{Space, Store},
     sweep::{
         CpuBackend, Run, Sweep,
         ahead::Ahead,
@@ -27,8 +27,8 @@ impl World {
     fn fill_whole(&self, threads: usize, batch: usize) -> Refined {
         let (model, base) = (self.model(), grid_of(&self.scene));
         let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
-        let (order, aim, most) = (Order::Potential, f64::MIN_POSITIVE, usize::MAX);
-        let refine = Refine { model: &model, base, levels: 2, order, aim, most, batch };
+        let (aim, most) = (f64::MIN_POSITIVE, usize::MAX);
+        let refine = Refine { model: &model, base, levels: 2, aim, most, batch };
         let mut backend = CpuBackend::new(&model, threads).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| refine.fill(&mut judges, &mut backend).unwrap())
@@ -37,7 +37,7 @@ impl World {
     /// The same blocks, each node solved from rest alone.
     fn solved_from_rest(&self, filled: &Store) -> Arc<Store> {
         let (model, space) = (self.model(), Space::new(&grid_of(&self.scene), 2).unwrap());
-        let store = Arc::new(Store::new(space, Order::Potential, filled.blocks().len()));
+        let store = Arc::new(Store::new(space, filled.blocks().len()));
         let ahead = Ahead::new(&model, Arc::clone(&store));
         let mut solver = ahead.solver();
         for (key, _) in filled.blocks() {

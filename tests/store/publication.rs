@@ -5,18 +5,18 @@ use haptize::{
     MAX_JOINTS,
     contact::Status,
     dataset::{Axis, Grid},
-    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store, record::width},
+    store::{Nodes, Place, PublishError, Space, SpaceError, Store, record::width},
 };
 
 #[test]
 fn the_same_blocks_in_another_order_make_the_same_store_to_the_bit() {
     for joints in [1, 3, 5] {
-        let one = store(joints, 2, Order::Potential, 0.7, 3, noise(joints, 5));
+        let one = store(joints, 2, 0.7, 3, noise(joints, 5));
         let mut all = one.blocks();
         // Level by level, backwards.
         all.reverse();
         all.sort_by_key(|(key, _)| one.space().block(*key).unwrap().0);
-        let other = Store::new(one.space().clone(), Order::Potential, all.len());
+        let other = Store::new(one.space().clone(), all.len());
         for (key, block) in all {
             let (level, place) = one.space().block(key).unwrap();
             other.publish(level, &place, block.nodes().clone()).unwrap();
@@ -32,7 +32,7 @@ fn the_same_blocks_in_another_order_make_the_same_store_to_the_bit() {
 #[test]
 fn a_block_without_its_foundation_or_twice_is_refused() {
     let space = space(2, 3);
-    let store = Store::new(space.clone(), Order::Linear, 64);
+    let store = Store::new(space.clone(), 64);
     let make = |level, block: &Place| nodes(&space, level, block, |_| true, noise(2, 1));
     let place = [1, 1, 0, 0, 0, 0];
     assert!(matches!(store.publish(1, &place, make(1, &place)), Err(PublishError::Order { .. })));
@@ -47,7 +47,7 @@ fn a_block_without_its_foundation_or_twice_is_refused() {
 #[test]
 fn what_is_not_sound_is_refused() {
     let space = space(2, 2);
-    let store = Store::new(space.clone(), Order::Linear, 64);
+    let store = Store::new(space.clone(), 64);
     let block = [0; MAX_JOINTS];
     let sound = nodes(&space, 0, &block, |_| true, noise(2, 1));
     let mut bad = vec![sound.clone(), sound.clone(), sound.clone(), sound.clone(), sound.clone()];
@@ -72,7 +72,7 @@ fn what_is_not_sound_is_refused() {
 #[test]
 fn a_full_store_says_so_and_room_can_be_made() {
     let space = space(1, 4);
-    let mut store = Store::new(space.clone(), Order::Linear, 1);
+    let mut store = Store::new(space.clone(), 1);
     let all: Vec<_> = (0..4).flat_map(|level| blocks(&space, level).into_iter().map(move |b| (level, b))).collect();
     let mut refused = 0;
     for (level, block) in &all {

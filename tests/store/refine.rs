@@ -6,7 +6,7 @@ use haptize::{
     JointVector,
     contact::{Equilibrium, Status},
     dataset::{Axis, Grid},
-    store::{Order, Space, Store, record::width},
+    store::{Space, Store, record::width},
     sweep::{
         Backend, CpuBackend, WithFallback,
         ahead::Ahead,
@@ -60,16 +60,10 @@ impl World {
 
     /// A base of `cells` cells along each axis, filled to `aim` by `backend`, `batch` configurations at a time, and its
     /// error at configurations that it has not seen.
-    fn fill<B: Backend>(
-        &self,
-        (cells, levels, batch): (usize, u32, usize),
-        order: Order,
-        aim: f64,
-        backend: &mut B,
-    ) -> Filled {
+    fn fill<B: Backend>(&self, (cells, levels, batch): (usize, u32, usize), aim: f64, backend: &mut B) -> Filled {
         let model = self.model();
         let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
-        let refine = Refine { model: &model, base: self.base(cells), levels, order, aim, most: 20_000, batch };
+        let refine = Refine { model: &model, base: self.base(cells), levels, aim, most: 20_000, batch };
         let refined = refine.fill(&mut judges, backend).unwrap();
         let unseen = judges[1].relative_error(|q| refined.store.sample(q).torque());
         Filled { refined, unseen }
@@ -77,29 +71,28 @@ impl World {
 }
 
 /// The same on the CPU.
-fn fill(cells: usize, levels: u32, order: Order, aim: f64) -> Filled {
+fn fill(cells: usize, levels: u32, aim: f64) -> Filled {
     let world = World::of(SCENE);
-    world.fill((cells, levels, 100), order, aim, &mut CpuBackend::new(&world.model(), 0).unwrap())
+    world.fill((cells, levels, 100), aim, &mut CpuBackend::new(&world.model(), 0).unwrap())
 }
 
 #[test]
 fn a_store_keeps_its_aim_where_nothing_was_solved_with_a_fraction_of_a_uniform_grids_nodes() {
-    for (order, aim) in [(Order::Potential, 0.045), (Order::Linear, 0.10)] {
-        let Filled { refined, unseen } = fill(4, 4, order, aim);
-        // Rms errors of a hundred configurations differ by a fifth or so.
-        assert!(refined.measured <= aim && unseen < 1.4 * aim, "{order:?}: {} and {unseen}", refined.measured);
-        // The coarsest uniform grid, by doubling, that is as good.
-        let uniform = [4, 8, 16].map(|cells| fill(cells, 1, order, f64::INFINITY));
-        let as_good = uniform.iter().find(|uniform| uniform.refined.measured <= aim);
-        let nodes = as_good.map_or(33_usize.pow(3), |uniform| uniform.refined.nodes);
-        assert!(2 * refined.nodes < nodes, "{order:?}: {} of {nodes} nodes", refined.nodes);
-        assert!(uniform[0].refined.measured > aim, "{order:?}: the base alone is good enough");
-    }
+    let aim = 0.045;
+    let Filled { refined, unseen } = fill(4, 4, aim);
+    // Rms errors of a hundred configurations differ by a fifth or so.
+    assert!(refined.measured <= aim && unseen < 1.4 * aim, "{} and {unseen}", refined.measured);
+    // The coarsest uniform grid, by doubling, that is as good.
+    let uniform = [4, 8, 16].map(|cells| fill(cells, 1, f64::INFINITY));
+    let as_good = uniform.iter().find(|uniform| uniform.refined.measured <= aim);
+    let nodes = as_good.map_or(33_usize.pow(3), |uniform| uniform.refined.nodes);
+    assert!(2 * refined.nodes < nodes, "{} of {nodes} nodes", refined.nodes);
+    assert!(uniform[0].refined.measured > aim, "the base alone is good enough");
 }
 
 #[test]
 fn nodes_hold_what_the_solver_found_and_two_fillings_are_the_same() {
-    let [one, other] = [(); 2].map(|()| fill(4, 3, Order::Potential, 0.05).refined);
+    let [one, other] = [(); 2].map(|()| fill(4, 3, 0.05).refined);
     let space = one.store.space();
     let mut seen = [0, 0];
     for ((key, block), (other_key, other)) in one.store.blocks().into_iter().zip(other.store.blocks()) {
@@ -128,12 +121,12 @@ fn nodes_hold_what_the_solver_found_and_two_fillings_are_the_same() {
 fn nodes_that_are_solved_together_are_those_solved_one_by_one_to_the_bit() {
     let world = World::of(SCENE);
     let model = world.model();
-    let alone = Arc::new(Store::new(Space::new(&world.base(6), 1).unwrap(), Order::Potential, 100));
+    let alone = Arc::new(Store::new(Space::new(&world.base(6), 1).unwrap(), 100));
     let ahead = Ahead::new(&model, Arc::clone(&alone));
     let mut solver = ahead.solver();
     for batch in [1, 50, 1000] {
         let mut backend = CpuBackend::new(&model, 2).unwrap();
-        let together = world.fill((6, 1, batch), Order::Potential, 1.0, &mut backend).refined;
+        let together = world.fill((6, 1, batch), 1.0, &mut backend).refined;
         assert_eq!(together.nodes, 7 * 7 * 7);
         for (key, block) in together.store.blocks() {
             let (level, place) = together.store.space().block(key).unwrap();
@@ -170,7 +163,7 @@ fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
     let filled = |breaks_after: usize| {
         let device = Breaking(CpuBackend::new(&model, 2).unwrap(), breaks_after);
         let mut backend = WithFallback::new(device, "a made-up device", &model);
-        world.fill((4, 2, 10), Order::Potential, 0.05, &mut backend).refined
+        world.fill((4, 2, 10), 0.05, &mut backend).refined
     };
     let (whole, lossy) = (filled(usize::MAX), filled(35));
     assert!(whole.notices.is_empty() && whole.by_level[1] > 0, "{:?}, {:?}", whole.notices, whole.by_level);
@@ -183,8 +176,8 @@ fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
     let error = {
         let mut device = Breaking(CpuBackend::new(&model, 2).unwrap(), 35);
         let mut judges = [1, 2].map(|seed| Judge::new(&world.scene, &model, seed, 10).unwrap());
-        let (base, order) = (world.base(4), Order::Potential);
-        let refine = Refine { model: &model, base, levels: 1, order, aim: 1.0, most: 1000, batch: 10 };
+        let base = world.base(4);
+        let refine = Refine { model: &model, base, levels: 1, aim: 1.0, most: 1000, batch: 10 };
         refine.fill(&mut judges, &mut device).err().unwrap()
     };
     assert_eq!(error.to_string(), "the backend failed: device lost");
@@ -192,7 +185,7 @@ fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
 
 #[test]
 fn the_torque_begins_at_the_boundary_without_a_jump() {
-    let store = fill(4, 2, Order::Potential, 0.05).refined.store;
+    let store = fill(4, 2, 0.05).refined.store;
     let mut before: Option<JointVector> = None;
     let mut contact = [false; 2];
     for k in 0..4000 {

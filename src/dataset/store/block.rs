@@ -54,7 +54,7 @@ pub struct Block {
     /// Places of nodes whose torque is not to be trusted.
     pub(super) failed: u64,
     /// Numbers of the interpolation at each node less those that the levels below give there, lengths in steps of the
-    /// level (`linear`: of the base).
+    /// level.
     pub(super) surplus: Box<[f32]>,
     /// How many blocks were published before it.
     pub(super) number: u64,

@@ -28,7 +28,7 @@
 //! energy = 0.5 * w.clip(0)**2                        # row r belongs to (b, p) = place[r]
 //! ```
 
-use super::{Nodes, Order, Space, Store, record::slope, record::width};
+use super::{Nodes, Space, Store, record::slope, record::width};
 use crate::{
     contact::Status,
     dataset::{
@@ -47,8 +47,12 @@ pub(in crate::dataset) const FORMAT: &str = "haptize store 1";
 #[derive(Deserialize, Serialize)]
 struct Shape {
     levels: u32,
-    order: Order,
+    /// Always [`ORDER`].
+    order: String,
 }
+
+/// How nodes are interpolated.
+const ORDER: &str = "potential";
 
 /// Checks that there is the memory that [`Dataset::refined`] takes for the points of `grid`.
 ///
@@ -138,7 +142,7 @@ pub(in crate::dataset) fn save(
     surface: Option<&Surface>,
     target: Target<'_>,
 ) -> Result<(), Error> {
-    let shape = Shape { levels: store.space.levels(), order: store.order };
+    let shape = Shape { levels: store.space.levels(), order: ORDER.to_owned() };
     let shape = serde_json::to_string(&shape)
         .map_err(|error| Error::Inconsistent { path: target.path().into(), reason: error.to_string() })?;
     let blocks = store.blocks();
@@ -173,6 +177,9 @@ pub(in crate::dataset) fn decode(path: &Path, file: Container) -> Result<Dataset
 fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Dataset, String> {
     let scene = file.text("scene")?.to_owned();
     let shape: Shape = serde_json::from_str(file.text("store")?).map_err(|error| format!("store: {error}"))?;
+    if shape.order != ORDER {
+        return Err(format!("its nodes are to be interpolated by {:?}, which is no more: bake it again", shape.order));
+    }
     let space = Space::new(&grid, shape.levels).map_err(|error| error.to_string())?;
     let (joints, wide) = (space.joints(), width(space.joints()));
     let keys = file.take::<u64>("block_keys", &[None])?;
@@ -190,7 +197,7 @@ fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Datas
     if let Some(k) = keys.windows(2).position(|pair| pair[0] >= pair[1]) {
         return Err(format!("block {} is out of order", k + 1));
     }
-    let store = Store::new(space, shape.order, keys.len());
+    let store = Store::new(space, keys.len());
     let mut first = 0;
     for (&key, &present) in keys.iter().zip(present.iter()) {
         let Some((level, block)) = store.space.block(key) else {

@@ -1,4 +1,4 @@
-//! The interpolants of one cell, from the numbers at its 2^d corners.
+//! The interpolant of one cell, from the numbers at its 2^d corners.
 //!
 //! A corner's number says by bit a on which side of the cell it lies along axis a. Numbers are kept kind by kind,
 //! corners side by side: to contract the last axis is to combine the second half of the corners with the first, which
@@ -107,16 +107,6 @@ fn contract_half_into<const HALF: usize>(from: &[f64], stride: usize, to: &mut [
         let (own, beyond) = sides(set);
         let to = to[set * HALF..][..HALF].iter_mut().zip(own).zip(beyond);
         to.for_each(|((to, own), beyond)| *to = near * own + far * beyond);
-    }
-}
-
-/// Leaves the multilinear interpolants of `numbers` at their first corner. `C = 2^D`; the others are overwritten.
-pub(super) fn multilinear<const D: usize, const C: usize>(numbers: &mut [[f64; C]], fractions: &[f64; MAX_JOINTS]) {
-    for numbers in numbers {
-        for axis in (0..D).rev() {
-            let (near, beyond) = numbers.split_at_mut(1 << axis);
-            near.iter_mut().zip(beyond).for_each(|(near, beyond)| *near += fractions[axis] * (*beyond - *near));
-        }
     }
 }
 

@@ -6,15 +6,15 @@
 //! | `directory` | from keys to blocks, for readers that never wait |
 //! | `block` | what a block holds |
 //! | `record` | the numbers of a node |
-//! | `kernel` | the interpolants of one cell |
+//! | `kernel` | the interpolant of one cell |
+//! | `levels` | the sum of the levels' cells |
 //! | `file` | a store on disk |
 //!
 //! *Hierarchy.* The interpolated function is a sum over the levels, each the interpolant of what the level's nodes have
 //! more than the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a
 //! node are tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and
-//! mixed second derivatives ([`Order::Potential`]), or hats ([`Order::Linear`]). A node that was not solved has no
-//! surplus: there the function is what the coarser levels say. So w is C1, or continuous, whichever nodes there are,
-//! and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
+//! mixed second derivatives. A node that was not solved has no surplus: there the function is what the coarser levels
+//! say. So w is C1, whichever nodes there are, and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
 //! 3, for hats; here with Hermite data and without the sparse grid's choice of levels.)
 //!
 //! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the
@@ -27,6 +27,7 @@ mod block;
 mod directory;
 pub(super) mod file;
 mod kernel;
+mod levels;
 pub mod record;
 pub mod space;
 mod sync;
@@ -35,9 +36,11 @@ pub use block::{Block, Nodes};
 pub use file::check_memory;
 pub use space::{Place, Space, SpaceError};
 
-use crate::{JointVector, MAX_JOINTS};
+use crate::{MAX_JOINTS, dataset::Grid};
 pub(crate) use block::beyond;
 use directory::{Directory, Refusal};
+pub use levels::Root;
+pub(crate) use levels::{Gathered, Levels, added, root, with_joints};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
 use space::MOST_BLOCK_JOINTS;
 use std::sync::{
@@ -45,23 +48,12 @@ use std::sync::{
     atomic::{AtomicU64, Ordering},
 };
 
-/// How a store interpolates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Order {
-    /// w and its gradient, each multilinear: continuous.
-    Linear,
-    /// w by cubic Hermite polynomials: C1, and the gradient is that of w.
-    Potential,
-}
-
 /// Blocks of C-space at several levels. Any number of threads may read and publish at once.
 ///
 /// Blocks are numbered in the order in which they are published. A reader that needs the same function twice, between
 /// which others publish, names a [horizon](Store::horizon): the number of blocks that count.
 pub struct Store {
     space: Space,
-    order: Order,
     blocks: Directory<Block>,
     /// Number of the next block. Held by writers while a block gets its number and is published, so that all before it
     /// are there.
@@ -98,60 +90,17 @@ pub enum PublishError {
     Full(usize),
 }
 
-/// The interpolated function at one configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Root {
-    /// w (sqrt(J)).
-    pub value: f64,
-    /// Its gradient (sqrt(J)/rad or /m).
-    pub slopes: JointVector,
-    /// Levels with a block around the configuration; 0 if there is none.
-    pub levels: u32,
-    /// Levels, from the base up, whose cell around the configuration has all its blocks.
-    pub whole: u32,
-    /// Whether a node around the configuration did not converge.
-    pub failed: bool,
-}
-
-/// Values at the corners of a cell.
-struct Gathered {
-    /// A block.
-    found: bool,
-    /// All blocks.
-    whole: bool,
-    /// A node.
-    any: bool,
-    /// A node that did not converge.
-    failed: bool,
-}
-
-impl Root {
-    /// Energy of contact, `U = max(0, w)^2 / 2` (J).
-    #[must_use]
-    pub fn energy(&self) -> f64 {
-        0.5 * self.value.max(0.0).powi(2)
-    }
-
-    /// Contact torque, `-dU/dq` where the slopes are the gradient of w: zero at w = 0, without a jump (N m or N).
-    #[must_use]
-    pub fn torque(&self) -> JointVector {
-        let mut torque = self.slopes;
-        torque.iter_mut().for_each(|slope| *slope *= -self.value.max(0.0));
-        torque
-    }
-}
-
 impl Store {
     /// An empty store over `space` with room for `most` blocks.
     #[must_use]
-    pub fn new(space: Space, order: Order, most: usize) -> Self {
-        Self { space, order, blocks: Directory::new(most), numbers: Mutex::new(0), published: AtomicU64::new(0) }
+    pub fn new(space: Space, most: usize) -> Self {
+        Self { space, blocks: Directory::new(most), numbers: Mutex::new(0), published: AtomicU64::new(0) }
     }
 
     /// Number of blocks published so far: what [`Store::sample_within`] needs to see the same function again.
     #[must_use]
     pub fn horizon(&self) -> u64 {
-        self.published.load(Ordering::Acquire)
+        Levels::horizon(self)
     }
 
     /// Most blocks for which there is room.
@@ -164,12 +113,6 @@ impl Store {
     #[must_use]
     pub fn space(&self) -> &Space {
         &self.space
-    }
-
-    /// Returns how it interpolates.
-    #[must_use]
-    pub fn order(&self) -> Order {
-        self.order
     }
 
     /// Makes room for `most` blocks.
@@ -260,36 +203,20 @@ impl Store {
         }
     }
 
-    /// Numbers of a node's surplus.
-    fn kinds(&self) -> usize {
-        match self.order {
-            Order::Linear => 1 + self.space.joints(),
-            Order::Potential => width(self.space.joints()),
-        }
-    }
-
     /// Surplus of the `nodes` of a block of `level`, all of whose nodes are `all`.
     fn surplus(&self, level: u32, all: &[(usize, Place)], nodes: &Nodes) -> Box<[f32]> {
         let joints = self.space.joints();
-        let kinds = self.kinds();
-        let mut surplus = vec![0.0; kinds * nodes.count()].into_boxed_slice();
+        let wide = width(joints);
+        let mut surplus = vec![0.0; wide * nodes.count()].into_boxed_slice();
         let solved =
-            all.iter().filter(|(place, _)| nodes.present >> place & 1 == 1).zip(surplus.chunks_exact_mut(kinds));
-        for (((_, node), surplus), record) in solved.zip(nodes.records.chunks_exact(width(joints))) {
+            all.iter().filter(|(place, _)| nodes.present >> place & 1 == 1).zip(surplus.chunks_exact_mut(wide));
+        for (((_, node), surplus), record) in solved.zip(nodes.records.chunks_exact(wide)) {
             let below = self.record(level, node);
             for (kind, set) in sets(joints).enumerate() {
-                let position = match self.order {
-                    Order::Potential => kind,
-                    Order::Linear if set.count_ones() <= 1 => (set << 1).checked_ilog2().unwrap_or(0) as usize,
-                    Order::Linear => continue,
-                };
                 let derivatives = (0..joints).filter(|a| set >> a & 1 == 1);
                 let step: f64 = derivatives.map(|a| self.space.step(0, a)).product();
-                let scale = match self.order {
-                    Order::Linear => 1.0,
-                    Order::Potential => 0.5_f64.powi((level * set.count_ones()) as i32),
-                };
-                surplus[position] = ((f64::from(record[kind]) * step - below[kind]) * scale) as f32;
+                let scale = 0.5_f64.powi((level * set.count_ones()) as i32);
+                surplus[kind] = ((f64::from(record[kind]) * step - below[kind]) * scale) as f32;
             }
         }
         surplus
@@ -308,23 +235,11 @@ impl Store {
             for side in 0..corners {
                 let corner = beyond(&cell.low, side);
                 let Some(block) = self.get(below, &self.space.block_of(&corner)) else { continue };
-                let Some(surplus) = block.surplus_at(self.space.place_of(&corner), self.kinds()) else { continue };
-                let at = |kind: usize| f64::from(surplus[kind]);
-                match self.order {
-                    Order::Linear => {
-                        let weight: f64 = (0..joints)
-                            .map(|a| if side >> a & 1 == 1 { cell.fractions[a] } else { 1.0 - cell.fractions[a] })
-                            .product();
-                        sum[0] += weight * at(0);
-                        (0..joints).for_each(|a| sum[slope(a)] += weight * at(1 + a));
-                    }
-                    Order::Potential => {
-                        let Some(weights) = kernel::transfer(joints, side, &cell.fractions) else { continue };
-                        for ((sum, weights), set) in sum.iter_mut().zip(&weights).zip(sets(joints)) {
-                            let scale = f64::from(1_u32 << below).powi(set.count_ones() as i32);
-                            *sum += scale * (0..wide).map(|kind| weights[kind] * at(kind)).sum::<f64>();
-                        }
-                    }
+                let Some(surplus) = block.surplus_at(self.space.place_of(&corner), wide) else { continue };
+                let Some(weights) = kernel::transfer(joints, side, &cell.fractions) else { continue };
+                for ((sum, weights), set) in sum.iter_mut().zip(&weights).zip(sets(joints)) {
+                    let scale = f64::from(1_u32 << below).powi(set.count_ones() as i32);
+                    *sum += scale * surplus.iter().zip(weights).map(|(x, weight)| weight * f64::from(*x)).sum::<f64>();
                 }
             }
         }
@@ -341,95 +256,56 @@ impl Store {
     /// those on which it rests, which were published before it.
     #[must_use]
     pub fn sample_within(&self, q: &[f64], horizon: u64) -> Root {
-        use kernel::rates;
-        match (self.order, self.space.joints()) {
-            (Order::Linear, 1) => self.linear::<1, 2, 2>(q, horizon),
-            (Order::Linear, 2) => self.linear::<2, 4, 3>(q, horizon),
-            (Order::Linear, 3) => self.linear::<3, 8, 4>(q, horizon),
-            (Order::Linear, 4) => self.linear::<4, 16, 5>(q, horizon),
-            (Order::Linear, 5) => self.linear::<5, 32, 6>(q, horizon),
-            (Order::Linear, _) => self.linear::<MAX_JOINTS, 64, 7>(q, horizon),
-            (Order::Potential, 1) => self.potential::<1, 2, { width(1) }, { rates(1) }>(q, horizon),
-            (Order::Potential, 2) => self.potential::<2, 4, { width(2) }, { rates(2) }>(q, horizon),
-            (Order::Potential, 3) => self.potential::<3, 8, { width(3) }, { rates(3) }>(q, horizon),
-            (Order::Potential, 4) => self.potential::<4, 16, { width(4) }, { rates(4) }>(q, horizon),
-            (Order::Potential, 5) => self.potential::<5, 32, { width(5) }, { rates(5) }>(q, horizon),
-            (Order::Potential, _) => self.potential::<MAX_JOINTS, 64, MAX_WIDTH, { rates(MAX_JOINTS) }>(q, horizon),
-        }
+        levels::root(self, q, horizon)
     }
 
-    /// `C = 2^D`, `N = 1 + D`.
-    fn linear<const D: usize, const C: usize, const N: usize>(&self, q: &[f64], horizon: u64) -> Root {
-        self.sum::<D, C, N>(q, horizon, |_, numbers, fractions, root| {
-            kernel::multilinear::<D, C>(numbers, fractions);
-            root.value += numbers[0][0];
-            root.slopes.iter_mut().zip(&numbers[1..]).for_each(|(sum, slope)| *sum += slope[0]);
-        })
+    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).
+    #[must_use]
+    pub fn most_bytes(joints: usize, nodes: usize) -> [usize; 2] {
+        let record = size_of::<f32>() * width(joints);
+        // Numbers of the node and of the interpolation, its gap and status; in the file key and places of the block.
+        let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * record + size_of::<f32>() + 1;
+        let file = 2 * size_of::<u64>() + record + size_of::<f32>() + 1;
+        [memory, file].map(|each| nodes.saturating_mul(each))
     }
 
-    /// `C = 2^D`, `W = width(D)`, `R = rates(D)`.
-    fn potential<const D: usize, const C: usize, const W: usize, const R: usize>(
-        &self,
-        q: &[f64],
-        horizon: u64,
-    ) -> Root {
-        self.sum::<D, C, W>(q, horizon, |level, numbers, fractions, root| {
-            let (value, slopes) = kernel::hermite::<D, C, W, R>(numbers, fractions);
-            let rise = f64::from(1_u32 << level);
-            root.value += value;
-            root.slopes.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += rise * slope);
-        })
+    /// Memory of all blocks (bytes).
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.blocks.iter().map(|(_, block)| block.bytes() + 2 * size_of::<usize>()).sum()
+    }
+}
+
+impl Levels for Store {
+    fn base(&self) -> &Grid {
+        self.space.base()
     }
 
-    /// Adds up the levels: `add` adds one, from the `N` numbers at the `C` corners of the cell of that level and the
-    /// fractions of it.
-    #[inline]
-    fn sum<const D: usize, const C: usize, const N: usize>(
-        &self,
-        q: &[f64],
-        horizon: u64,
-        mut add: impl FnMut(u32, &mut [[f64; C]; N], &[f64; MAX_JOINTS], &mut Root),
-    ) -> Root {
-        let slopes = JointVector::zeros(self.space.joints());
-        let mut root = Root { value: 0.0, slopes, levels: 0, whole: 0, failed: false };
-        let mut numbers = [[0.0; C]; N];
-        let mut cell = self.space.locate(q);
-        for level in 0..self.space.levels() {
-            if level > 0 {
-                cell.halve();
-            }
-            let gathered = self.gather::<D, C, N>(level, &cell.low, horizon, &mut numbers);
-            if !gathered.found {
-                break;
-            }
-            root.levels = level + 1;
-            root.whole += u32::from(gathered.whole && root.whole == level);
-            root.failed |= gathered.failed;
-            if gathered.any {
-                add(level, &mut numbers, &cell.fractions, &mut root);
-            }
-        }
-        root.slopes.iter_mut().enumerate().for_each(|(a, slope)| *slope /= self.space.step(0, a));
-        root
+    fn count(&self) -> u32 {
+        self.space.levels()
     }
 
-    /// Copies the surplus at the corners of the cell with first corner `low`, zeros where there is no node.
-    fn gather<const D: usize, const C: usize, const N: usize>(
+    fn horizon(&self) -> u64 {
+        self.published.load(Ordering::Acquire)
+    }
+
+    fn gather<const C: usize, const W: usize>(
         &self,
         level: u32,
         low: &Place,
         horizon: u64,
-        numbers: &mut [[f64; C]; N],
+        numbers: &mut [[f64; C]; W],
     ) -> Gathered {
+        let joints = const { C.ilog2() as usize };
         // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
         // the other. With blocks of one node they do so along all axes.
-        let parity = (0..D).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
-        let is_one = D > MOST_BLOCK_JOINTS;
+        let parity = (0..joints).map(|a| ((low[a] & 1) as usize) << a).sum::<usize>();
+        let is_one = joints > MOST_BLOCK_JOINTS;
         let (odd, places) = if is_one { (C - 1, 0) } else { (parity, C - 1) };
         let even = (C - 1) ^ odd;
         // Keys of the block of the first corner, and of those beside it by sets of axes.
         let mut keys = [self.space.key(level, &self.space.block_of(low)); C];
-        for a in 0..D {
+        for a in 0..joints {
             let (near, beyond) = keys.split_at_mut(1 << a);
             beyond.iter_mut().zip(near).for_each(|(beyond, near)| *beyond = near.wrapping_add(self.space.stride(a)));
         }
@@ -445,7 +321,7 @@ impl Store {
             loop {
                 let corner = beside | inside;
                 let place = (corner ^ odd) & places;
-                match block.and_then(|block| block.surplus_at(place, N)) {
+                match block.and_then(|block| block.surplus_at(place, W)) {
                     Some(surplus) => {
                         gathered.any = true;
                         numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
@@ -464,37 +340,6 @@ impl Store {
             }
         }
         gathered
-    }
-
-    /// The numbers that `level` adds at the corners of its cell with first corner `low`, corner by corner, zeros where
-    /// there is no node; `None` where there is no block.
-    #[must_use]
-    pub fn added(&self, level: u32, low: &Place) -> Option<Vec<Vec<f64>>> {
-        let nodes = || (0..1_usize << self.space.joints()).map(|side| beyond(low, side));
-        let block = |node: &Place| self.get(level, &self.space.block_of(node));
-        nodes().any(|node| block(&node).is_some()).then(|| {
-            let numbers = |node: Place| {
-                let surplus = block(&node)?.surplus_at(self.space.place_of(&node), self.kinds())?;
-                Some(surplus.iter().map(|&number| number.into()).collect())
-            };
-            nodes().map(|node| numbers(node).unwrap_or_else(|| vec![0.0; self.kinds()])).collect()
-        })
-    }
-
-    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).
-    #[must_use]
-    pub fn most_bytes(joints: usize, nodes: usize) -> [usize; 2] {
-        let record = size_of::<f32>() * width(joints);
-        // Numbers of the node and of the interpolation, its gap and status; in the file key and places of the block.
-        let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * record + size_of::<f32>() + 1;
-        let file = 2 * size_of::<u64>() + record + size_of::<f32>() + 1;
-        [memory, file].map(|each| nodes.saturating_mul(each))
-    }
-
-    /// Memory of all blocks (bytes).
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.blocks.iter().map(|(_, block)| block.bytes() + 2 * size_of::<usize>()).sum()
     }
 }
 

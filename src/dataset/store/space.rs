@@ -90,6 +90,11 @@ impl Space {
         Ok(Self { base: base.clone(), levels: levels.max(1), bits, shift })
     }
 
+    /// The grid of the base.
+    pub(super) fn base(&self) -> &Grid {
+        &self.base
+    }
+
     /// Number of joints d.
     #[must_use]
     pub fn joints(&self) -> usize {
@@ -210,19 +215,9 @@ impl Space {
     /// it.
     #[must_use]
     pub fn cell(&self, level: u32, q: &[f64]) -> Place {
-        let mut cell = self.locate(q);
+        let mut cell = Cell::of(&self.base, q);
         (0..level).for_each(|_| cell.halve());
         cell.low
-    }
-
-    /// The cell of the base around `q`, which has one entry per joint, at the grid's border beyond it.
-    pub(super) fn locate(&self, q: &[f64]) -> Cell {
-        let mut cell = Cell { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
-        for (a, (axis, &q)) in self.base.axes.iter().zip(q).enumerate() {
-            let (low, fraction) = axis.cell(q);
-            (cell.low[a], cell.fractions[a]) = (low as u32, fraction);
-        }
-        cell
     }
 
     /// The cell of the base around a node of `level`.
@@ -237,6 +232,16 @@ impl Space {
 }
 
 impl Cell {
+    /// The cell of `grid` around `q`, which has one entry per joint, at the grid's border beyond it.
+    pub fn of(grid: &Grid, q: &[f64]) -> Self {
+        let mut cell = Self { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
+        for (a, (axis, &q)) in grid.axes.iter().zip(q).enumerate() {
+            let (low, fraction) = axis.cell(q);
+            (cell.low[a], cell.fractions[a]) = (low as u32, fraction);
+        }
+        cell
+    }
+
     /// The cell of the level above, finer by half, around the same configuration. Halving is exact.
     pub fn halve(&mut self) {
         for (low, fraction) in self.low.iter_mut().zip(&mut self.fractions) {

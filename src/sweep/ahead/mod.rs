@@ -88,8 +88,7 @@ pub struct Ahead<'a> {
 }
 
 impl<'a> Ahead<'a> {
-    /// Fills `store` with equilibria of `model`, which has tangents ([`Model::with_tangent`]) if the store is
-    /// [`crate::store::Order::Potential`].
+    /// Fills `store` with equilibria of `model`, which has tangents ([`Model::with_tangent`]).
     #[must_use]
     pub fn new(model: &'a Model<'a>, store: Arc<Store>) -> Self {
         let scale = Scale::new(model, store.space());

@@ -11,7 +11,7 @@ use crate::{
     contact::{Model, Solvers, Status},
     dataset::{InterpolationError, MeasuredError},
     scene::{Interpolation, Scene},
-    store::{Order, Store},
+    store::Store,
     sweep::{
         lowest::{self, Lattice},
         reference::{Reference, ReferenceError},
@@ -59,17 +59,14 @@ impl Judge {
     #[must_use]
     pub fn measure(&self, store: &Store) -> MeasuredError {
         let errors = self.0.distances(|q| store.sample(q).torque());
-        let interpolation = match store.order() {
-            Order::Linear => Interpolation::Linear,
-            Order::Potential => Interpolation::Potential,
-        };
+        let interpolation = Interpolation::Potential.name();
         MeasuredError {
             configurations: errors.len(),
             left_out: self.0.left_out,
             torque: self.0.torque,
             lever_arm: self.0.lever_arm,
-            interpolation: interpolation.name().to_owned(),
-            errors: vec![InterpolationError::of(interpolation.name(), errors)],
+            interpolation: interpolation.to_owned(),
+            errors: vec![InterpolationError::of(interpolation, errors)],
         }
     }
 

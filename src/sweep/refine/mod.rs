@@ -37,7 +37,7 @@ use crate::{
     contact::{Backend, Model, Solvers, Status},
     dataset::Grid,
     scene::{JointKind, LEVER_ARM},
-    store::{Nodes, Order, Place, PublishError, Space, SpaceError, Store, beyond, record::width},
+    store::{Nodes, Place, PublishError, Space, SpaceError, Store, beyond, record::width},
 };
 use nodebook::{HeldNodes, Nodebook, held_bytes};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -56,14 +56,12 @@ const FALL: f64 = 0.125;
 
 /// Options of a store.
 pub struct Refine<'a> {
-    /// Object and proxy; with tangents for [`Order::Potential`].
+    /// Object and proxy, with tangents ([`Model::with_tangent`]).
     pub model: &'a Model<'a>,
     /// The base.
     pub base: Grid,
     /// Most levels, the base included.
     pub levels: u32,
-    /// How it is to interpolate.
-    pub order: Order,
     /// Rms error of the torque, over the rms of the torque (1).
     pub aim: f64,
     /// Most nodes that are solved.
@@ -128,7 +126,7 @@ impl Refine<'_> {
             if lowest {
                 seen.lower(&solvers, &filling.book.nodes);
             }
-            let store = filling.store(self.order)?;
+            let store = filling.store()?;
             let (mean, deviation) = seen.0.mean_square(|q| store.sample(q).torque());
             let aim = (self.aim * seen.torque()).powi(2);
             let refinable = filling.leaves.iter().any(|leaf| leaf.level + 1 < self.levels);
@@ -192,8 +190,8 @@ struct Filling<'a, B> {
 
 impl<B: Backend> Filling<'_, B> {
     /// The store of what is there.
-    fn store(&self, order: Order) -> Result<Store, PublishError> {
-        let mut store = Store::new(self.book.nodes.space.clone(), order, 0);
+    fn store(&self) -> Result<Store, PublishError> {
+        let mut store = Store::new(self.book.nodes.space.clone(), 0);
         for (level, nodes) in (0..).zip(&self.nodes) {
             publish(&mut store, &self.book.nodes, level, nodes)?;
         }

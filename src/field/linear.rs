@@ -8,63 +8,66 @@
 //! Points that were not computed carry the torque of the nearest one that was. So the torque does not end inside the
 //! object where the measurements do: it keeps the value that it has there.
 
-use super::{FieldError, boundary::BoundaryLayer, points::Checked};
+use super::{
+    FieldError, Flags, Interpolant, Sample,
+    boundary::BoundaryLayer,
+    points::{Around, Checked, Point},
+};
 use crate::{
     JointVector,
     dataset::{Axis, Grid, Stencil},
+    store::with_joints,
 };
 
 /// Interleaved point by point, so that a corner is one stretch of memory.
-pub(super) struct Layered {
+pub(super) struct Linear {
+    grid: Grid,
+    points: Vec<Point>,
     layer: BoundaryLayer,
     /// `joints + 2` numbers a grid point: torque, depth (see `boundary.rs`), energy.
     records: Vec<f64>,
 }
 
 /// The interpolated numbers of a record.
-pub(super) struct Interpolated {
-    pub torque: JointVector,
+struct Interpolated {
+    torque: JointVector,
     /// Below the boundary (sqrt(J)).
-    pub depth: f64,
+    depth: f64,
     /// U (J).
-    pub energy: f64,
+    energy: f64,
     /// Factor of the layer on the torque, 0 to 1.
-    pub held: f64,
+    held: f64,
 }
 
-impl Layered {
-    /// The paper's: contact where the index exceeds `threshold`.
-    pub fn linear(data: &Checked<'_>, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
-        let layer = BoundaryLayer::new(&data.dataset.grid, slope);
-        let zeros = JointVector::zeros(data.dataset.grid.joints());
-        let mut records = Vec::with_capacity(data.points.len() * (data.dataset.grid.joints() + 2));
+impl Linear {
+    /// Interpolates the torque of `data`, in contact where the index exceeds `threshold`.
+    pub fn new(data: Checked<'_>, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
+        let grid = data.dataset.grid.clone();
+        let layer = BoundaryLayer::new(&grid, slope);
+        let zeros = JointVector::zeros(grid.joints());
+        let mut records = Vec::with_capacity(data.points.len() * (grid.joints() + 2));
         for point in 0..data.points.len() {
             records.extend_from_slice(data.torque(point, &zeros)?);
             records.extend([0.0, data.energy(point)?]);
         }
-        let mut field = Self { layer, records };
-        let free: Vec<bool> = data.points.iter().map(|point| !point.touching).collect();
-        let depths = field.layer.depths_behind_index(&data.dataset.grid, &free, threshold, field.greatest(data));
-        field.put_depths(&depths);
+        let mut field = Self { grid, points: data.points, layer, records };
+        let free: Vec<bool> = field.points.iter().map(|point| !point.touching).collect();
+        let depths = layer.depths_behind_index(&field.grid, &free, threshold, field.greatest());
+        for (record, depth) in field.records.chunks_exact_mut(field.grid.joints() + 2).zip(depths) {
+            record[field.grid.joints()] = depth;
+        }
         Ok(field)
     }
 
     /// Largest size of a torque (sqrt(J)).
-    fn greatest(&self, data: &Checked<'_>) -> f64 {
-        let joints = data.dataset.grid.joints();
+    fn greatest(&self) -> f64 {
+        let joints = self.grid.joints();
         let sizes = self.records.chunks_exact(joints + 2).map(|record| self.layer.size(&record[..joints]));
         sizes.fold(0.0, f64::max)
     }
 
-    fn put_depths(&mut self, depths: &[f64]) {
-        let width = self.records.len() / depths.len().max(1);
-        for (record, &depth) in self.records.chunks_exact_mut(width).zip(depths) {
-            record[width - 2] = depth;
-        }
-    }
-
     /// The field in the cell of `stencil`.
-    pub fn at<const D: usize>(&self, stencil: &Stencil) -> Interpolated {
+    fn at<const D: usize>(&self, stencil: &Stencil) -> Interpolated {
         let mut torque = [0.0; D];
         let (mut depth, mut energy) = (0.0, 0.0);
         for (point, weight) in stencil.corners() {
@@ -80,12 +83,23 @@ impl Layered {
         torque.iter_mut().for_each(|tau| *tau *= held);
         Interpolated { torque, depth, energy, held }
     }
+}
 
-    /// Greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is
+impl Interpolant for Linear {
+    fn sample(&self, q: &[f64], _: u64) -> (Sample, u32) {
+        let stencil = self.grid.locate(q);
+        let at = with_joints!(self.grid.joints(), D => self.at::<D>(&stencil));
+        let mut around = Around::of(&self.points, &stencil);
+        around.flags.set(Flags::LAYER, at.held < 1.0);
+        around.share = at.held;
+        (around.sample(at.torque, at.energy, at.depth > 0.0), 1)
+    }
+
+    /// The greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is
     /// affine in each coordinate of a cell, so that its norm is greatest at a corner, where its columns are the
     /// differences along the edges that meet there.
-    pub fn relative_stiffness(&self, grid: &Grid, slopes: &JointVector) -> f64 {
-        let joints = grid.joints();
+    fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
+        let (grid, joints) = (&self.grid, self.grid.joints());
         let torque = |point: usize| &self.records[point * (joints + 2)..point * (joints + 2) + joints];
         let steepness = |p: usize, q: usize| {
             let scaled = |((a, b), slope): ((&f64, &f64), &f64)| (a - b).powi(2) / slope;

@@ -1,0 +1,146 @@
+//! A function w over nodes of several levels: the sum of what each level's cell adds.
+//!
+//! The nodes of a uniform grid are one level, those of a [store](super::Store) several: one look-up serves both. It
+//! visits one cell a level, from the base up, until a level has nothing there.
+
+use super::{
+    kernel,
+    record::width,
+    space::{Cell, Place},
+};
+use crate::{JointVector, dataset::Grid};
+
+/// Nodes of a function w.
+pub(crate) trait Levels: Send + Sync {
+    /// The grid of the base, level 0.
+    fn base(&self) -> &Grid;
+
+    /// Number of levels, the base included.
+    fn count(&self) -> u32;
+
+    /// Number of blocks that are published; none are those of nodes that do not change.
+    fn horizon(&self) -> u64;
+
+    /// Copies the numbers ([`super::record`]) that the first `horizon` blocks of `level` add at the corners of its cell
+    /// with first corner `low`: kind by kind, lengths in steps of the level, zeros where there is no node.
+    /// `C = 2^d`, `W = width(d)`.
+    fn gather<const C: usize, const W: usize>(
+        &self,
+        level: u32,
+        low: &Place,
+        horizon: u64,
+        numbers: &mut [[f64; C]; W],
+    ) -> Gathered;
+}
+
+/// What there is at the corners of a cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gathered {
+    /// A block.
+    pub found: bool,
+    /// All blocks.
+    pub whole: bool,
+    /// A node.
+    pub any: bool,
+    /// A node that did not converge.
+    pub failed: bool,
+}
+
+/// The interpolated function at one configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Root {
+    /// w (sqrt(J)).
+    pub value: f64,
+    /// Its gradient (sqrt(J)/rad or /m).
+    pub slopes: JointVector,
+    /// Levels with a block around the configuration; 0 if there is none.
+    pub levels: u32,
+    /// Levels, from the base up, whose cell around the configuration has all its blocks.
+    pub whole: u32,
+    /// Whether a node around the configuration did not converge.
+    pub failed: bool,
+}
+
+impl Root {
+    /// Energy of contact, `U = max(0, w)^2 / 2` (J).
+    #[must_use]
+    pub fn energy(&self) -> f64 {
+        0.5 * self.value.max(0.0).powi(2)
+    }
+
+    /// Contact torque, `-dU/dq` where the slopes are the gradient of w: zero at w = 0, without a jump (N m or N).
+    #[must_use]
+    pub fn torque(&self) -> JointVector {
+        let mut torque = self.slopes;
+        torque.iter_mut().for_each(|slope| *slope *= -self.value.max(0.0));
+        torque
+    }
+}
+
+/// Evaluates an expression with the constant `$d`, the number of joints `$joints`.
+macro_rules! with_joints {
+    ($joints:expr, $d:ident => $value:expr) => {
+        match $joints {
+            1 => with_joints!(@ $d = 1, $value),
+            2 => with_joints!(@ $d = 2, $value),
+            3 => with_joints!(@ $d = 3, $value),
+            4 => with_joints!(@ $d = 4, $value),
+            5 => with_joints!(@ $d = 5, $value),
+            _ => with_joints!(@ $d = $crate::MAX_JOINTS, $value),
+        }
+    };
+    (@ $d:ident = $joints:expr, $value:expr) => {{
+        const $d: usize = $joints;
+        $value
+    }};
+}
+pub(crate) use with_joints;
+
+/// The function at `q`, one entry per joint, of the first `horizon` blocks of `nodes`; beyond the grid that at its
+/// border. Never allocates, locks or waits.
+pub(crate) fn root<N: Levels>(nodes: &N, q: &[f64], horizon: u64) -> Root {
+    use kernel::rates;
+    with_joints!(nodes.base().joints(), D => sum::<N, D, { 1 << D }, { width(D) }, { rates(D) }>(nodes, q, horizon))
+}
+
+/// Adds up the levels, each from the `W` numbers at the `C` corners of its cell. `C = 2^D`, `W = width(D)`,
+/// `R = rates(D)`.
+fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize>(
+    nodes: &N,
+    q: &[f64],
+    horizon: u64,
+) -> Root {
+    let mut root = Root { value: 0.0, slopes: JointVector::zeros(D), levels: 0, whole: 0, failed: false };
+    let mut numbers = [[0.0; C]; W];
+    let mut cell = Cell::of(nodes.base(), q);
+    for level in 0..nodes.count() {
+        if level > 0 {
+            cell.halve();
+        }
+        let gathered = nodes.gather(level, &cell.low, horizon, &mut numbers);
+        if !gathered.found {
+            break;
+        }
+        root.levels = level + 1;
+        root.whole += u32::from(gathered.whole && root.whole == level);
+        root.failed |= gathered.failed;
+        if gathered.any {
+            let (value, slopes) = kernel::hermite::<D, C, W, R>(&mut numbers, &cell.fractions);
+            let rise = f64::from(1_u32 << level);
+            root.value += value;
+            root.slopes.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += rise * slope);
+        }
+    }
+    root.slopes.iter_mut().zip(&nodes.base().axes).for_each(|(slope, axis)| *slope /= axis.step);
+    root
+}
+
+/// The numbers that `level` of `nodes` adds at the corners of its cell with first corner `low`, kind by kind; `None`
+/// where it has nothing there.
+pub(crate) fn added<N: Levels>(nodes: &N, level: u32, low: &Place) -> Option<Vec<f64>> {
+    with_joints!(nodes.base().joints(), D => {
+        let mut numbers = [[0.0; 1 << D]; width(D)];
+        let gathered = nodes.gather(level, low, u64::MAX, &mut numbers);
+        gathered.found.then(|| numbers.as_flattened().to_vec())
+    })
+}
