@@ -72,7 +72,7 @@ enum Interpolant {
 }
 
 /// The field at one configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// tau_bar on the proxy (N m or N).
     pub torque: JointVector,
