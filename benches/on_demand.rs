@@ -166,7 +166,7 @@ impl World<'_> {
         let mut last: Option<(usize, JointVector)> = None;
         for (k, tick) in ticks.iter().enumerate() {
             if k > 0 {
-                steepest = steepest.max(distance(&tick.contact_torque, &ticks[k - 1].contact_torque).sqrt());
+                steepest = steepest.max(distance(&tick.sample.torque, &ticks[k - 1].sample.torque).sqrt());
             }
             if k % 4 > 1 {
                 continue;
@@ -182,7 +182,7 @@ impl World<'_> {
             }
             contacts += usize::from(solved.status == Status::Contact);
             size += distance(&solved.torque, &JointVector::zeros(tick.proxy.len()));
-            felt += distance(&solved.torque, &tick.contact_torque);
+            felt += distance(&solved.torque, &tick.sample.torque);
             full += distance(&solved.torque, &store.sample(&tick.proxy).torque());
         }
         let speeds = ticks
@@ -209,7 +209,7 @@ impl World<'_> {
         let residual =
             ticks.iter().map(|t| t.accounts.residual().abs() / t.accounts.exchanged.max(1e-6)).fold(0.0, f64::max);
         let port = ticks.iter().filter_map(|t| t.accounts.device_port()).fold(f64::MAX, f64::min);
-        let odd = ticks.iter().filter(|t| !t.contact_torque.is_finite() || t.fault.is_some()).count();
+        let odd = ticks.iter().filter(|t| !t.sample.torque.is_finite() || t.fault.is_some()).count();
         println!(
             "created less taken: at most {created:.2e} J; energy balance error at most {residual:.1e} of the energy \
              exchanged; the device's port at least {port:.2e} J; {odd} ticks not finite or at fault"

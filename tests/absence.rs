@@ -140,7 +140,7 @@ fn each_effect_changes_its_own_loop_and_no_bit_of_the_other() {
     let trace = plain.felt();
     let places = plain.places(&trace);
     let (felt, drawn) = (bits(&trace.ticks), bits(&plain.drawn(&places)));
-    assert!(trace.ticks.iter().filter(|tick| tick.contact).count() > 500);
+    assert!(trace.ticks.iter().filter(|tick| tick.sample.contact).count() > 500);
     assert!(trace.ticks.iter().all(|tick| tick.fault.is_none()));
     for effect in EFFECTS {
         let named = with(true, &[effect]);

@@ -99,11 +99,10 @@ fn a_press_from_the_side_touches_with_several_nodes_and_its_torque_is_smooth() {
     let (setup, trace) = felt(&dataset, |setup| setup.scene.motion.press.clone());
     let summary = trace.summary();
     assert!(summary.contact_share > 0.3 && summary.contact_share < 0.9, "{summary:?}");
-    assert!(!trace.ticks[0].contact && summary.max_contact_torque > 0.1, "{summary:?}");
+    assert!(!trace.ticks[0].sample.contact && summary.max_contact_torque > 0.1, "{summary:?}");
     assert!(summary.max_contact_torque_step < 0.03 * summary.max_contact_torque, "{summary:?}");
     // What no dataset of a real object tells: how many points of the proxy touch where it presses deepest.
-    let deepest =
-        trace.ticks.iter().max_by(|a, b| a.contact_torque.norm().total_cmp(&b.contact_torque.norm())).unwrap();
+    let deepest = trace.ticks.iter().max_by(|a, b| a.sample.torque.norm().total_cmp(&b.sample.torque.norm())).unwrap();
     let mut pose = setup.chain.new_pose();
     setup.chain.pose(&deepest.proxy, &mut pose);
     let touching = pose.nodes.iter().filter(|node| node.x + 0.006 > 0.120 && node.z < 0.0).count();

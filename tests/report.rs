@@ -8,11 +8,11 @@ use haptize::{
     contact::Status,
     dataset::{Axis, Contacts, Dataset, Grid, JointLabel, Provenance, Surface},
     device::Applied,
+    field::Sample,
     object::Object,
     proxy::{Chain, Node as ProxyNode},
     render::{
         accounts::Accounts,
-        flags::Flags,
         haptic::Inputs,
         timing::{Durations, Timing},
         trace::{Frame, Tick, Trace},
@@ -157,19 +157,18 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
         Tick {
             time,
             inputs: Inputs { position: q, age: 0.0, elapsed: 1e-3, interval: 1e-3 },
-            in_arrears: false,
-            restart: false,
             hand: q,
             device: q,
             proxy: q,
             device_torque: torque,
             applied: Applied::whole(&torque),
-            contact_torque: torque,
-            index: f64::from(u8::from(!forces.is_empty())),
-            contact: !forces.is_empty(),
-            contact_nodes: forces.len() as u32,
-            flags: Flags::default(),
-            fault: None,
+            sample: Sample {
+                torque,
+                index: f64::from(u8::from(!forces.is_empty())),
+                contact: !forces.is_empty(),
+                contact_nodes: forces.len() as u32,
+                ..Sample::default()
+            },
             accounts: Accounts {
                 stored,
                 kinetic: 1e-4 * (5.0 * time).sin().powi(2),
@@ -181,6 +180,7 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
                 leak: 2e-5 * (9.0 * time).sin(),
                 ..Accounts::default()
             },
+            ..Tick::default()
         }
     };
     let ticks: Vec<Tick> = (0..ticks).map(tick).collect();
@@ -322,7 +322,7 @@ fn files_are_complete_and_the_same_twice() {
     assert!(once == write("twice", &trace), "the same data gave other bytes");
 
     let mut other = trace.clone();
-    other.ticks[700].contact_torque[1] += 0.05;
+    other.ticks[700].sample.torque[1] += 0.05;
     let differing: Vec<String> =
         once.into_iter().zip(write("other", &other)).filter(|(a, b)| a != b).map(|(a, _)| a.0).collect();
     assert_eq!(differing, ["motion.svg", "motion.png"]);
@@ -430,7 +430,7 @@ fn the_press_has_a_curve_for_every_joint_and_shades_every_contact() {
         let strokes = svg.matches(&format!(r#"stroke="{}""#, report::colour::series(joint))).count();
         assert_eq!(strokes, 6 + usize::from(joint == 0));
     }
-    let contacts = trace.ticks.windows(2).filter(|pair| !pair[0].contact && pair[1].contact).count();
+    let contacts = trace.ticks.windows(2).filter(|pair| !pair[0].sample.contact && pair[1].sample.contact).count();
     let shades = svg.matches(&format!(r#"fill="{}""#, report::colour::SHADE)).count();
     assert_eq!(contacts, 2);
     assert_eq!(shades, 4 * contacts + 1, "four panels and the legend");
@@ -496,7 +496,7 @@ fn empty_and_broken_data_give_annotated_figures() {
 
     let mut broken = recording(&chain, &object, 300);
     for tick in &mut broken.ticks {
-        tick.contact_torque = JointVector::from_slice(&[f64::NAN, f64::INFINITY, 1e300]);
+        tick.sample.torque = JointVector::from_slice(&[f64::NAN, f64::INFINITY, 1e300]);
         tick.proxy = JointVector::from_slice(&[f64::NAN]);
         tick.accounts.leak = f64::NEG_INFINITY;
     }

@@ -15,6 +15,7 @@ use crate::{
     dataset::{self, Dataset, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
+        effects::ContactEffects,
         mcap,
         realtime::Options,
         recording::Recording,
@@ -74,7 +75,8 @@ pub struct Arguments {
     /// joint states in MCAP, for other programs and for --motion; only the table that other names give can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Replay the session in this file and check that it matches bit for bit.
+    /// Replay the session in this file and check that it matches bit for bit. One on demand is replayed with the dataset
+    /// that it left.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
     replay: Option<PathBuf>,
     /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
@@ -86,7 +88,7 @@ pub struct Arguments {
     /// Begin at once, against the clock, from a scene of which nothing was baked: contact is solved ahead of the
     /// motion, coarse before fine, and kept in this file, a dataset, from time to time and in the end. What it holds
     /// already is used.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "record", "beside"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "beside"])]
     on_demand: Option<PathBuf>,
     #[command(flatten)]
     choices: on_demand::Choices,
@@ -107,6 +109,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let setup = if exploring.is_some() { Setup::explored(&dataset) } else { Setup::new(&dataset) };
     let setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
+    let is_table = |file: &PathBuf| FileKind::of_log(file) != FileKind::Mcap;
+    let needs_solved_forces = setup.haptics.effects().is_some_and(ContactEffects::need_solved_forces);
+    if needs_solved_forces && arguments.record.as_ref().is_some_and(is_table) {
+        return Err("friction and contact damping act on demand by contact forces that no recording holds: leave out \
+                    --record, or record joint states (a name that ends in .mcap)"
+            .into());
+    }
     if let Some(advice) = &setup.advice {
         tell(format_args!("haptize: note: {advice}"));
     }
@@ -387,8 +396,7 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
         replace_file(file, |out| mcap::write(&played.trace, facts, out)).map_err(|error| unwritten(file, error))?;
         return Ok(());
     }
-    let recording = Recording::of(&played.trace);
-    replace_file(file, |out| recording.write(&played.trace.joints, out)).map_err(|error| unwritten(file, error))?;
+    replace_file(file, |out| Recording::write(&played.trace, out)).map_err(|error| unwritten(file, error))?;
     Ok(())
 }
 

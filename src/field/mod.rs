@@ -66,7 +66,7 @@ trait Interpolant: Send + Sync {
 }
 
 /// The field at one configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
     /// tau_bar on the proxy (N m or N).
     pub torque: JointVector,

@@ -71,6 +71,16 @@ pub struct State {
     effects: Option<EffectState>,
 }
 
+/// The contact that a tick feels.
+pub enum ContactSource {
+    /// The dataset's.
+    Dataset,
+    /// Solved meanwhile.
+    Live(Box<Live>),
+    /// Felt before, in a session that is replayed.
+    Recorded(Sample),
+}
+
 /// Output of a tick. All but `torque` is for recording and drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
@@ -231,11 +241,11 @@ impl Haptics {
 
     /// One tick.
     pub fn tick(&self, state: &mut State, inputs: &Inputs) -> Output {
-        self.tick_with(state, inputs, None)
+        self.tick_with(state, inputs, &mut ContactSource::Dataset)
     }
 
-    /// One tick over contact that is solved meanwhile, if it is `live`.
-    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, mut live: Option<&mut Live>) -> Output {
+    /// One tick over the contact of `source`.
+    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, source: &mut ContactSource) -> Output {
         let checked = self
             .watchdog
             .check(inputs, &state.device)
@@ -252,9 +262,10 @@ impl Haptics {
             state.accounts.device_moved(&self.coupling, inputs.elapsed, moved, &proxy, torque);
             state.device = inputs.position;
         }
-        let sample = match &mut live {
-            None => self.field.sample(&proxy),
-            Some(live) => live.sample(&self.field, &proxy, &state.accounts, self.period),
+        let sample = match source {
+            ContactSource::Dataset => self.field.sample(&proxy),
+            ContactSource::Live(live) => live.sample(&self.field, &proxy, &state.accounts, self.period),
+            ContactSource::Recorded(sample) => *sample,
         };
         let stored = self.field.has_energy().then_some(sample.energy);
         let spring = self.coupling.spring_energy(&proxy, &state.device);
@@ -279,9 +290,9 @@ impl Haptics {
         state.held.push(&torque);
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
-        let solved = live.as_deref().map_or(&[][..], |live| live.forces(&proxy));
+        let solved = if let ContactSource::Live(live) = source { live.forces(&proxy) } else { &[] };
         let stopped = self.move_proxy(state, interval, &velocity, &sample, solved);
-        if let Some(live) = live {
+        if let ContactSource::Live(live) = source {
             live.tell(&state.motion.position, &state.proxy_velocity);
         }
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }

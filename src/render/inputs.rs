@@ -3,7 +3,7 @@
 use crate::JointVector;
 
 /// Input of a tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inputs {
     /// Device position y_k (rad or m).
     pub position: JointVector,

@@ -35,7 +35,7 @@ pub fn write(trace: &Trace, facts: BTreeMap<String, String>, out: impl Write) ->
         let none = JointVector::zeros(0);
         let states = [
             (&tick.device, &velocity, &tick.applied.torque),
-            (&tick.proxy, &none, &tick.contact_torque),
+            (&tick.proxy, &none, &tick.sample.torque),
             (&tick.hand, &none, &none),
             (&tick.device, &none, &tick.device_torque),
         ];

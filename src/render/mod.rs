@@ -3,6 +3,7 @@
 pub mod accounts;
 pub mod channels;
 pub(crate) mod clock;
+mod columns;
 mod contact_forces;
 pub mod control;
 pub mod coupling;

@@ -12,7 +12,7 @@ use super::{
     live::Live,
     session::{Driver, Frames, Latest, Plan, SessionError},
     timing::{Durations, Percentiles, Timing},
-    trace::{Frame, Tick, Trace},
+    trace::{Tick, Trace},
 };
 use crate::device::{Device, Halt, Scheduler};
 use std::{
@@ -292,6 +292,7 @@ pub fn run(
     options: Options<'_>,
 ) -> Result<(Trace, Timing), SessionError> {
     let Options { stop, live, mut on_tick } = options;
+    let solved_meanwhile = live.is_some();
     let scheduler = device.scheduler();
     let (mut body, Ends { mut ticks, latest, .. }) = HapticLoop::new(haptics, device, live)?;
     let start = *body.driver.start();
@@ -339,7 +340,11 @@ pub fn run(
         let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
         clock::unlock_memory();
         let (refused, lateness, interval, cost, [missed_deadlines, late, unrecorded]) = felt;
-        let Drawn { frames, shown, cost: frame_cost, missed: missed_frames } = drawn.unwrap_or_default();
+        let (mut frames, mut frame_cost, mut missed_frames) = Default::default();
+        if let Some(drawn) = drawn {
+            drawn.frames.count(&mut recorded);
+            (frames, frame_cost, missed_frames) = (drawn.frames.kept(), drawn.cost, drawn.missed);
+        }
         let timing = Timing {
             refused,
             lateness: lateness.percentiles(),
@@ -353,27 +358,26 @@ pub fn run(
             stolen: clock::stolen().zip(stolen_before).map(|(after, before)| after - before),
             unrecorded,
         };
-        Ok((Trace { joints: plan.joints.clone(), start, ticks: recorded, frames, shown }, timing))
+        let joints = plan.joints.clone();
+        Ok((Trace { joints, start, ticks: recorded, frames, solved_meanwhile }, timing))
     })
 }
 
 /// Result of the graphics thread.
-#[derive(Default)]
-struct Drawn {
-    frames: Vec<Frame>,
-    shown: Vec<f64>,
+struct Drawn<'session, 'object> {
+    frames: Frames<'session, 'object>,
     cost: Percentiles,
     missed: u64,
 }
 
 /// The graphics thread: a frame whenever one is due, from the first tick on, until the session is over. When it falls
 /// behind by more than a frame it draws the frames that it owes, without waiting: the object's time must not slow down.
-fn draw(
-    mut frames: Frames<'_, '_>,
+fn draw<'session, 'object>(
+    mut frames: Frames<'session, 'object>,
     mut latest: triple_buffer::Output<Latest>,
     mut cost: Durations,
     over: &AtomicBool,
-) -> Drawn {
+) -> Drawn<'session, 'object> {
     while latest.read().time < 0.0 && !over.load(Ordering::Acquire) {
         thread::sleep(FIRST_TICK_PERIOD);
     }
@@ -393,6 +397,5 @@ fn draw(
             missed += 1;
         }
     }
-    let (frames, shown) = frames.kept();
-    Drawn { frames, shown, cost: cost.percentiles(), missed }
+    Drawn { frames, cost: cost.percentiles(), missed }
 }

@@ -3,15 +3,17 @@
 //! differs.
 //!
 //! CSV: comments (#), one of them with the device's first position and one with the instants of the frames that were
-//! kept; a header; one row a tick. `elapsed`, `interval`, `age` and position are the tick's inputs as in [`Inputs`];
-//! `restart` is 1 where a fault was cleared; `frames` is how many frames of the object showed this tick; torque and
-//! proxy are the answer, `held` is what the device held of the torque (as much as was asked for where a file has no
-//! such columns). Numbers are printed so that reading gives the same bits. A position of a wrong number of joints has
-//! empty fields.
+//! kept; a header; one row a tick, of the columns in `columns.rs`. `elapsed`, `interval`, `age` and position are the
+//! tick's inputs as in [`Inputs`](super::haptic::Inputs); `restart` is 1 where a fault was cleared; `frames` is how many
+//! frames of the object showed this tick; torque and proxy are the answer, `held` is what the device held of the torque
+//! (as much as was asked for where a file has no such columns). Where contact was solved meanwhile, the contact that was
+//! felt follows, and a replay feels it again: another time other solutions come in time. Numbers are printed so that
+//! reading gives the same bits. A position of a wrong number of joints has empty fields.
 
 use super::{
+    columns::{Column, FELT, RECORDED, number, read, read_vector, width, write_vector},
     graphics::Graphics,
-    haptic::{Haptics, Inputs},
+    haptic::Haptics,
     session::{Driver, Frames, Plan, SessionError},
     trace::{Tick, Trace},
 };
@@ -26,26 +28,16 @@ use std::{
     path::Path,
 };
 
-/// All that a session needs to be had again.
-#[derive(Clone, Debug, PartialEq)]
+/// All that a session needs to be had again: of its ticks, what the columns tell.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
     /// Position at which the proxy was put (rad or m).
     start: JointVector,
     /// When the frames that were kept were drawn (s).
     kept: Vec<f64>,
-    rows: Vec<Row>,
-}
-
-/// One tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Row {
-    inputs: Inputs,
-    restart: bool,
-    frames: u32,
-    hand: JointVector,
-    torque: JointVector,
-    proxy: JointVector,
-    held: JointVector,
+    /// Whether contact was solved meanwhile.
+    solved_meanwhile: bool,
+    ticks: Vec<Tick>,
 }
 
 /// What to do with a file that is no recording.
@@ -64,68 +56,37 @@ const START: &str = "# start";
 /// Beginning of the comment with the frames' instants.
 const KEPT: &str = "# frames";
 
-/// Numbers of a row before its vectors: elapsed, interval, age, restart, frames.
-const SCALARS: usize = 5;
+/// The columns of which a row consists where contact is `solved_meanwhile`.
+fn columns(solved_meanwhile: bool) -> impl Iterator<Item = &'static Column> {
+    RECORDED.iter().chain(FELT.iter().filter(move |_| solved_meanwhile))
+}
 
 impl Recording {
-    /// Returns the recording of `trace`, which must hold every tick of the session.
-    #[must_use]
-    pub fn of(trace: &Trace) -> Self {
-        let row = |tick: &Tick| Row {
-            inputs: tick.inputs,
-            restart: tick.restart,
-            frames: 0,
-            hand: tick.hand,
-            torque: tick.device_torque,
-            proxy: tick.proxy,
-            held: tick.applied.torque,
-        };
-        let mut rows: Vec<Row> = trace.ticks.iter().map(row).collect();
-        for shown in &trace.shown {
-            let tick = trace.ticks.partition_point(|tick| tick.time < *shown);
-            if let Some(row) = rows.get_mut(tick) {
-                row.frames += 1;
-            }
+    /// Writes what is needed to have the session of `trace` again, which must hold every tick of it.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write(trace: &Trace, out: &mut impl Write) -> io::Result<()> {
+        let joints = trace.joints.len();
+        writeln!(out, "# a session of haptize {}; `haptize play --replay` gives it again", env!("CARGO_PKG_VERSION"))?;
+        let mut table = Table::new(out);
+        write_vector(&trace.start, joints, table.field(START)?)?;
+        table.end()?;
+        table.field(KEPT)?.fields(trace.frames.iter().map(|frame| frame.time))?.end()?;
+        columns(trace.solved_meanwhile).try_for_each(|column| column.head(&trace.joints, &mut table))?;
+        table.end()?;
+        for tick in &trace.ticks {
+            let mut row = *tick;
+            columns(trace.solved_meanwhile).try_for_each(|column| column.write(&mut row, joints, &mut table))?;
+            table.end()?;
         }
-        Self { start: trace.start, kept: trace.frames.iter().map(|frame| frame.time).collect(), rows }
+        Ok(())
     }
 
     /// Number of ticks.
     #[must_use]
     pub fn ticks(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Writes the recording, its `joints` named in the header.
-    ///
-    /// # Errors
-    /// Those of `out`.
-    pub fn write(&self, joints: &[JointLabel], out: &mut impl Write) -> io::Result<()> {
-        writeln!(out, "# a session of haptize {}; `haptize play --replay` gives it again", env!("CARGO_PKG_VERSION"))?;
-        let mut table = Table::new(out);
-        // Empty fields where the session has no such vector.
-        let vector = |table: &mut Table<_>, vector: &JointVector| {
-            (0..joints.len()).try_for_each(|joint| table.optional(vector.get(joint)).map(|_| ()))
-        };
-        vector(table.field(START)?, &self.start)?;
-        table.end()?;
-        table.field(KEPT)?.fields(&self.kept)?.end()?;
-        table.fields(["elapsed [s]", "interval [s]", "age [s]", "restart", "frames"])?;
-        for what in ["position", "hand"] {
-            table.fields(joints.iter().map(|joint| joint.heading(what)))?;
-        }
-        table.fields(joints.iter().map(|joint| joint.effort_heading("torque")))?;
-        table.fields(joints.iter().map(|joint| joint.heading("proxy")))?;
-        table.fields(joints.iter().map(|joint| joint.effort_heading("held")))?.end()?;
-        for row in &self.rows {
-            let Inputs { position, age, elapsed, interval } = &row.inputs;
-            table.fields([elapsed, interval, age])?.field(u8::from(row.restart))?.field(row.frames)?;
-            for column in [position, &row.hand, &row.torque, &row.proxy, &row.held] {
-                vector(&mut table, column)?;
-            }
-            table.end()?;
-        }
-        Ok(())
+        self.ticks.len()
     }
 
     /// Reads the recording in `file`, of a proxy of `joints` joints.
@@ -134,7 +95,7 @@ impl Recording {
     /// When the file cannot be read or is no such recording; the error names file and line.
     pub fn read(file: &Path, joints: usize) -> Result<Self, TableError> {
         let mut lines = Lines::open(file, GREATEST_FILE, REMEDY)?;
-        let mut recording = Self { start: JointVector::zeros(0), kept: Vec::new(), rows: Vec::new() };
+        let mut recording = Self::default();
         let (mut line, mut header) = (Vec::new(), false);
         let wrong = |lines: &Lines<_>, what| lines.error(format!("{what}; {REMEDY} for a proxy of {joints} joints"));
         while let Some(text) = lines.next_text(&mut line)? {
@@ -142,19 +103,24 @@ impl Recording {
             let text = text.trim();
             if let Some(start) = text.strip_prefix(START) {
                 let fields: Vec<&str> = start.split(',').skip(1).collect();
-                recording.start = vector(&fields, joints).map_err(bad)?;
+                recording.start = read_vector(&fields, joints).map_err(bad)?;
             } else if let Some(kept) = text.strip_prefix(KEPT) {
                 recording.kept = kept.split(',').skip(1).map(number).collect::<Result<_, _>>().map_err(bad)?;
             } else if text.is_empty() || text.starts_with('#') {
             } else if !header && text.starts_with("elapsed") {
                 header = true;
             } else {
-                recording.rows.push(row(text, joints).map_err(bad)?);
+                let (tick, solved_meanwhile) = row(text, joints).map_err(bad)?;
+                if solved_meanwhile != recording.solved_meanwhile && !recording.ticks.is_empty() {
+                    return Err(bad("another number of fields than above".into()));
+                }
+                recording.solved_meanwhile = solved_meanwhile;
+                recording.ticks.push(tick);
             }
         }
-        if recording.start.len() != joints || recording.rows.is_empty() {
+        if recording.start.len() != joints || recording.ticks.is_empty() {
             let what =
-                format!("{} ticks and a first position of {} joints", recording.rows.len(), recording.start.len());
+                format!("{} ticks and a first position of {} joints", recording.ticks.len(), recording.start.len());
             return Err(wrong(&lines, what));
         }
         Ok(recording)
@@ -173,21 +139,25 @@ impl Recording {
     ) -> Result<Trace, SessionError> {
         let mut device = Playback { recording: self, next: None };
         let mut driver = Driver::new(haptics, &mut device, None)?;
-        let plan = Plan { joints, ticks: self.rows.len(), snapshots: self.kept.clone() };
+        let plan = Plan { joints, ticks: self.ticks.len(), snapshots: self.kept.clone() };
         let mut frames = graphics.map(|graphics| Frames::new(graphics, &plan));
         let mut ticks = plan.new_ticks()?;
-        for row in &self.rows {
-            if row.restart {
+        for recorded in &self.ticks {
+            if recorded.restart {
                 driver.clear_fault();
             }
-            let (tick, latest) = driver.tick(row.inputs.elapsed, row.inputs.interval);
-            ticks.push(tick);
+            if self.solved_meanwhile {
+                driver.feel(recorded.sample);
+            }
+            let (tick, latest) = driver.tick(recorded.inputs.elapsed, recorded.inputs.interval);
+            ticks.push(Tick { frames: recorded.frames, ..tick });
             if let Some(frames) = &mut frames {
-                (0..row.frames).for_each(|_| frames.draw(&latest));
+                (0..recorded.frames).for_each(|_| frames.draw(&latest));
             }
         }
-        let (frames, shown) = frames.map(Frames::kept).unwrap_or_default();
-        Ok(Trace { joints: plan.joints, start: self.start, ticks, frames, shown })
+        let frames = frames.map(Frames::kept).unwrap_or_default();
+        let (joints, solved_meanwhile) = (plan.joints, self.solved_meanwhile);
+        Ok(Trace { joints, start: self.start, ticks, frames, solved_meanwhile })
     }
 
     /// Number of the first tick of `trace` whose torque or proxy is not that of the recording, to the last bit; none
@@ -195,11 +165,10 @@ impl Recording {
     #[must_use]
     pub fn first_difference(&self, trace: &Trace) -> Option<usize> {
         let same = |a: &JointVector, b: &JointVector| a.iter().map(|x| x.to_bits()).eq(b.iter().map(|x| x.to_bits()));
-        let differs =
-            |(row, tick): (&Row, &Tick)| !(same(&row.torque, &tick.device_torque) && same(&row.proxy, &tick.proxy));
-        let length = self.rows.len().min(trace.ticks.len());
-        let unequal = (self.rows.len() != trace.ticks.len()).then_some(length);
-        self.rows.iter().zip(&trace.ticks).position(differs).or(unequal)
+        let differs = |(a, b): (&Tick, &Tick)| !(same(&a.device_torque, &b.device_torque) && same(&a.proxy, &b.proxy));
+        let length = self.ticks.len().min(trace.ticks.len());
+        let unequal = (self.ticks.len() != trace.ticks.len()).then_some(length);
+        self.ticks.iter().zip(&trace.ticks).position(differs).or(unequal)
     }
 }
 
@@ -216,62 +185,37 @@ impl Device for Playback<'_> {
             let start = self.recording.start;
             return Reading { position: start, age: 0.0, hand: start };
         };
-        // No more readings than rows are asked for.
-        let row = &self.recording.rows[next.min(self.recording.rows.len() - 1)];
-        Reading { position: row.inputs.position, age: row.inputs.age, hand: row.hand }
+        // No more readings than ticks are asked for.
+        let tick = &self.recording.ticks[next.min(self.recording.ticks.len() - 1)];
+        Reading { position: tick.inputs.position, age: tick.inputs.age, hand: tick.hand }
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {
-        // The row that was read last.
-        let row = self.next.and_then(|next| self.recording.rows.get(next.checked_sub(1)?));
-        let held = row.map(|row| row.held).filter(|held| held.len() == torque.len());
+        // The tick that was read last.
+        let tick = self.next.and_then(|next| self.recording.ticks.get(next.checked_sub(1)?));
+        let held = tick.map(|tick| tick.applied.torque).filter(|held| held.len() == torque.len());
         Applied::whole(&held.unwrap_or(*torque))
     }
 }
 
-fn row(text: &str, joints: usize) -> Result<Row, String> {
-    let fields: Vec<&str> = text.split(',').collect();
-    let known = [5, 4].map(|vectors| SCALARS + vectors * joints);
-    if !known.contains(&fields.len()) {
-        return Err(format!("{} fields in the place of {}", fields.len(), known[0]));
+/// The tick of a row of `text`, and whether contact was solved meanwhile.
+fn row(text: &str, joints: usize) -> Result<(Tick, bool), String> {
+    let (fields, mut tick) = (text.split(',').collect::<Vec<_>>(), Tick::default());
+    let (whole, felt) = (width(RECORDED, joints), width(FELT, joints));
+    let (solved_meanwhile, without_held) = (fields.len() == whole + felt, fields.len() + joints == whole);
+    if fields.len() != whole && !solved_meanwhile && !without_held {
+        return Err(format!("{} fields in the place of {whole}", fields.len()));
     }
-    let frames: u32 = number(fields[4])?;
-    if frames > MAX_FRAMES {
-        return Err(format!("{frames} frames in one tick, more than {MAX_FRAMES}"));
+    let known = &RECORDED[..RECORDED.len() - usize::from(without_held)];
+    read(known, &fields, joints, &mut tick)?;
+    if without_held {
+        tick.applied.torque = tick.device_torque;
     }
-    let vector = |k: usize| vector(&fields[SCALARS + k * joints..][..joints], joints);
-    Ok(Row {
-        inputs: Inputs {
-            elapsed: number(fields[0])?,
-            interval: number(fields[1])?,
-            age: number(fields[2])?,
-            position: vector(0)?,
-        },
-        restart: number::<u8>(fields[3])? != 0,
-        frames,
-        hand: vector(1)?,
-        torque: vector(2)?,
-        proxy: vector(3)?,
-        held: vector(if fields.len() == known[0] { 4 } else { 2 })?,
-    })
-}
-
-/// The numbers in `fields`, or no joints where all are empty.
-fn vector(fields: &[&str], joints: usize) -> Result<JointVector, String> {
-    if fields.iter().all(|field| field.trim().is_empty()) {
-        return Ok(JointVector::zeros(0));
+    if solved_meanwhile {
+        read(FELT, &fields[whole..], joints, &mut tick)?;
     }
-    if fields.len() != joints {
-        return Err(format!("{} coordinates", fields.len()));
+    if tick.frames > MAX_FRAMES {
+        return Err(format!("{} frames in one tick, more than {MAX_FRAMES}", tick.frames));
     }
-    let mut vector = JointVector::zeros(joints);
-    for (value, field) in vector.iter_mut().zip(fields) {
-        *value = number(field)?;
-    }
-    Ok(vector)
-}
-
-fn number<T: std::str::FromStr>(field: &str) -> Result<T, String> {
-    let shown = || field.trim().chars().take(40).collect::<String>();
-    field.trim().parse().map_err(|_| format!("\"{}\" is not such a number", shown()))
+    Ok((tick, solved_meanwhile))
 }

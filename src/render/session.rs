@@ -8,11 +8,11 @@ use super::{
     effects::ContactEffects,
     flags::Fault,
     graphics::{Graphics, GraphicsError},
-    haptic::{Haptics, Inputs, State},
+    haptic::{ContactSource, Haptics, Inputs, State},
     live::Live,
     trace::{Frame, Tick, Trace},
 };
-use crate::{JointVector, dataset::JointLabel, device::Device, memory};
+use crate::{JointVector, dataset::JointLabel, device::Device, field::Sample, memory};
 
 /// How long, and what to keep of the object's shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,7 +79,7 @@ pub struct Driver<'session> {
     ticks: usize,
     restart: bool,
     start: JointVector,
-    live: Option<Live>,
+    source: ContactSource,
 }
 
 impl Plan {
@@ -119,13 +119,19 @@ impl<'session> Driver<'session> {
         }
         let position = device.read(0.0).position;
         let state = haptics.start(&position)?;
-        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position, live })
+        let source = live.map_or(ContactSource::Dataset, |live| ContactSource::Live(Box::new(live)));
+        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position, source })
     }
 
     /// Asks for a fault to be cleared at the next tick: the loop then starts again where the device is. Nothing happens
     /// where there is no fault, or the device still reports no position.
     pub fn clear_fault(&mut self) {
         self.restart = true;
+    }
+
+    /// Has the next ticks feel the contact of `sample`.
+    pub(super) fn feel(&mut self, sample: Sample) {
+        self.source = ContactSource::Recorded(sample);
     }
 
     /// Returns where the device was when the session began (rad or m).
@@ -152,7 +158,7 @@ impl<'session> Driver<'session> {
             && self.state.fault().is_some()
             && self.haptics.restart(&mut self.state, &reading.position).is_ok();
         let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
-        let output = self.haptics.tick_with(&mut self.state, &inputs, self.live.as_mut());
+        let output = self.haptics.tick_with(&mut self.state, &inputs, &mut self.source);
         let applied = self.device.apply(&output.torque);
         self.state.hold(&applied.torque);
         let share = if output.sample.contact { output.sample.share } else { 0.0 };
@@ -167,13 +173,11 @@ impl<'session> Driver<'session> {
             proxy: output.proxy,
             device_torque: output.torque,
             applied,
-            contact_torque: output.sample.torque,
-            index: output.sample.index,
-            contact: output.sample.contact,
-            contact_nodes: output.sample.contact_nodes,
+            sample: output.sample,
             flags: output.flags,
             fault: output.fault,
             accounts: output.accounts,
+            frames: 0,
         };
         (tick, latest)
     }
@@ -190,7 +194,7 @@ pub(super) struct Frames<'session, 'object> {
     graphics: &'session mut Graphics<'object>,
     snapshots: std::iter::Peekable<std::vec::IntoIter<f64>>,
     kept: Vec<Frame>,
-    /// Time of the tick that each frame showed (s).
+    /// Time of the tick that each frame showed (s); ascending.
     shown: Vec<f64>,
 }
 
@@ -220,9 +224,19 @@ impl<'session, 'object> Frames<'session, 'object> {
         }
     }
 
-    /// The frames that were kept, and the time of the tick that each frame showed.
-    pub(super) fn kept(self) -> (Vec<Frame>, Vec<f64>) {
-        (self.kept, self.shown)
+    /// Counts in each of `ticks` the frames that showed it.
+    pub(super) fn count(&self, ticks: &mut [Tick]) {
+        for shown in &self.shown {
+            let tick = ticks.partition_point(|tick| tick.time < *shown);
+            if let Some(tick) = ticks.get_mut(tick) {
+                tick.frames += 1;
+            }
+        }
+    }
+
+    /// The frames that were kept.
+    pub(super) fn kept(self) -> Vec<Frame> {
+        self.kept
     }
 }
 
@@ -248,6 +262,9 @@ pub fn run(
         }
         ticks.push(tick);
     }
-    let (frames, shown) = frames.map(Frames::kept).unwrap_or_default();
-    Ok(Trace { joints: plan.joints.clone(), start: *driver.start(), ticks, frames, shown })
+    if let Some(frames) = &frames {
+        frames.count(&mut ticks);
+    }
+    let frames = frames.map(Frames::kept).unwrap_or_default();
+    Ok(Trace { joints: plan.joints.clone(), start: *driver.start(), ticks, frames, solved_meanwhile: false })
 }

@@ -6,16 +6,17 @@
 
 use super::{
     accounts::Accounts,
+    columns::TRACED,
     flags::{Fault, Flags},
     haptic::Inputs,
 };
-use crate::{JointVector, csv::Table, dataset::JointLabel, device::Applied};
+use crate::{JointVector, csv::Table, dataset::JointLabel, device::Applied, field::Sample};
 use glam::DVec3;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// One tick of the haptic loop, at its beginning.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tick {
     /// Since the start (s).
     pub time: f64,
@@ -35,20 +36,16 @@ pub struct Tick {
     pub device_torque: JointVector,
     /// Part of it that the device applied, and why not all.
     pub applied: Applied,
-    /// Contact torque tau_bar on the proxy, after the boundary layer (N m or N).
-    pub contact_torque: JointVector,
-    /// Interpolated contact index, 0 to 1.
-    pub index: f64,
-    /// Whether the index exceeds its threshold.
-    pub contact: bool,
-    /// Object nodes in contact at the heaviest grid corner in contact; 0 out of contact or where none are stored.
-    pub contact_nodes: u32,
+    /// Contact that the proxy felt.
+    pub sample: Sample,
     /// Remarks on the tick.
     pub flags: Flags,
     /// Why the torque is being brought to zero, if it is.
     pub fault: Option<Fault>,
     /// Energy accounts at the beginning of the tick.
     pub accounts: Accounts,
+    /// Frames of the object that showed it, kept or not; known when the session is over.
+    pub frames: u32,
 }
 
 /// The object at one instant.
@@ -73,8 +70,8 @@ pub struct Trace {
     pub ticks: Vec<Tick>,
     /// Ascending in time; empty without graphics.
     pub frames: Vec<Frame>,
-    /// Time of the tick that each frame showed, kept or not (s); ascending.
-    pub shown: Vec<f64>,
+    /// Whether contact was solved meanwhile: what was felt is then nowhere but here.
+    pub solved_meanwhile: bool,
 }
 
 /// Key figures of a session. Sizes of torques are norms over the joints that turn, those of forces over the joints that
@@ -151,8 +148,8 @@ impl Trace {
         s.clamped = self.ticks.iter().filter(|tick| !tick.applied.clamps.is_empty()).count();
         s.halted = self.ticks.iter().filter(|tick| tick.applied.halt.is_some()).count();
         for tick in &self.ticks {
-            s.max_contact_nodes = s.max_contact_nodes.max(tick.contact_nodes);
-            raise([&mut s.max_contact_torque, &mut s.max_contact_force], self.sizes(&tick.contact_torque));
+            s.max_contact_nodes = s.max_contact_nodes.max(tick.sample.contact_nodes);
+            raise([&mut s.max_contact_torque, &mut s.max_contact_force], self.sizes(&tick.sample.torque));
             raise([&mut s.max_device_torque, &mut s.max_device_force], self.sizes(&tick.device_torque));
             let residual = tick.accounts.residual().abs();
             s.max_account_residual = s.max_account_residual.max(residual);
@@ -167,14 +164,15 @@ impl Trace {
                     self.sizes(&change)
                 };
                 let contact = [&mut s.max_contact_torque_step, &mut s.max_contact_force_step];
-                raise(contact, step(|tick| &tick.contact_torque));
+                raise(contact, step(|tick| &tick.sample.torque));
                 let device = [&mut s.max_device_torque_step, &mut s.max_device_force_step];
                 raise(device, step(|tick| &tick.device_torque));
             }
         }
         if let (Some(first), Some(last)) = (self.ticks.first(), self.ticks.last()) {
             s.seconds = last.time - first.time;
-            s.contact_share = self.ticks.iter().filter(|tick| tick.contact).count() as f64 / self.ticks.len() as f64;
+            s.contact_share =
+                self.ticks.iter().filter(|tick| tick.sample.contact).count() as f64 / self.ticks.len() as f64;
             if last.accounts.exchanged > 0.0 {
                 s.max_relative_account_residual = s.max_account_residual / last.accounts.exchanged;
             }
@@ -222,7 +220,10 @@ impl Trace {
 
 /// Ticks as CSV: one header line with units, then one row a tick, with every energy account ([`Accounts::named`]); a
 /// field is empty where nothing is known. Numbers are printed so that reading them gives the same bits.
-pub struct TickTable<W>(Table<W>);
+pub struct TickTable<W> {
+    table: Table<W>,
+    joints: usize,
+}
 
 impl<W: Write> TickTable<W> {
     /// Writes the header.
@@ -231,30 +232,15 @@ impl<W: Write> TickTable<W> {
     /// Those of `out`, here and below.
     pub fn new(joints: &[JointLabel], out: W) -> io::Result<Self> {
         let mut table = Table::new(out);
-        table.field("time [s]")?;
-        for what in ["hand", "device", "proxy"] {
-            table.fields(joints.iter().map(|joint| joint.heading(what)))?;
-        }
-        for what in ["device torque", "held torque", "contact torque"] {
-            table.fields(joints.iter().map(|joint| joint.effort_heading(what)))?;
-        }
-        table.fields(["contact index", "contact", "contact nodes", "flags", "fault", "clamps", "halt"])?;
-        table.fields(Accounts::default().named().map(|(name, _)| format!("{name} [J]")))?;
-        table.end()?;
-        Ok(Self(table))
+        TRACED.iter().try_for_each(|column| column.head(joints, &mut table))?;
+        table.fields(Accounts::default().named().map(|(name, _)| format!("{name} [J]")))?.end()?;
+        Ok(Self { table, joints: joints.len() })
     }
 
     /// Writes a row.
     pub fn add(&mut self, tick: &Tick) -> io::Result<()> {
-        let table = &mut self.0;
-        table.field(tick.time)?;
-        let torques = [&tick.device_torque, &tick.applied.torque, &tick.contact_torque];
-        for vector in [&tick.hand, &tick.device, &tick.proxy].into_iter().chain(torques) {
-            table.fields(vector.iter())?;
-        }
-        table.field(tick.index)?.field(u8::from(tick.contact))?.field(tick.contact_nodes)?;
-        table.field(tick.flags.bits())?.optional(tick.fault)?;
-        table.field(tick.applied.clamps.bits())?.optional(tick.applied.halt)?;
+        let (Self { table, joints }, mut row) = (self, *tick);
+        TRACED.iter().try_for_each(|column| column.write(&mut row, *joints, table))?;
         for (_, account) in tick.accounts.named() {
             table.optional(account)?;
         }
@@ -263,7 +249,7 @@ impl<W: Write> TickTable<W> {
 
     /// Hands everything on to where `out` leads.
     pub fn finish(self) -> io::Result<()> {
-        self.0.finish()
+        self.table.finish()
     }
 }
 
@@ -281,20 +267,13 @@ mod tests {
         Tick {
             time,
             inputs: Inputs { position: one, age: 0.0, elapsed: 1e-3, interval: 1e-3 },
-            in_arrears: false,
-            restart: false,
             hand: one,
             device: one,
             proxy: one,
             device_torque: one,
             applied: Applied::whole(&one),
-            contact_torque: one,
-            index: 1.0,
-            contact: torque != 0.0,
-            contact_nodes: 3,
-            flags: Flags::default(),
-            fault: None,
-            accounts: Accounts::default(),
+            sample: Sample { torque: one, index: 1.0, contact: torque != 0.0, contact_nodes: 3, ..Sample::default() },
+            ..Tick::default()
         }
     }
 
@@ -315,9 +294,9 @@ mod tests {
     #[test]
     fn torques_and_forces_are_apart() {
         let mut ticks = vec![tick(0.0, 0.0), tick(0.001, 0.0)];
-        ticks[1].contact_torque = JointVector::from_slice(&[3.0, 0.3, 0.4]);
+        ticks[1].sample.torque = JointVector::from_slice(&[3.0, 0.3, 0.4]);
         ticks[1].device_torque = JointVector::from_slice(&[-2.0, 0.0, 0.1]);
-        ticks[0].contact_torque = JointVector::zeros(3);
+        ticks[0].sample.torque = JointVector::zeros(3);
         ticks[0].device_torque = JointVector::zeros(3);
         let joints = ["m", "rad", "rad"].map(|unit| JointLabel { name: unit.into(), unit: unit.into() });
         let s = Trace { joints: joints.into(), ticks, ..Trace::default() }.summary();

@@ -72,7 +72,7 @@ impl EndForce {
         if !Self::is_known(chain) {
             return None;
         }
-        let force = |tick: &Tick| end_force(chain, &tick.proxy, &tick.contact_torque).unwrap_or(DVec3::NAN);
+        let force = |tick: &Tick| end_force(chain, &tick.proxy, &tick.sample.torque).unwrap_or(DVec3::NAN);
         let contacts = press::contact_intervals(&trace.ticks);
         let longest = contacts.into_iter().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
         let forces = trace.ticks.iter().map(|tick| (tick.time, force(tick))).collect();

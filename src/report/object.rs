@@ -63,7 +63,7 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
         let number = trace.ticks.partition_point(|tick| tick.time <= frame.time).checked_sub(1)?;
         Some(&trace.ticks[number])
     };
-    let touching = |frame: &Frame| tick(frame).is_some_and(|tick| tick.contact);
+    let touching = |frame: &Frame| tick(frame).is_some_and(|tick| tick.sample.contact);
     let first = frames.iter().position(touching).unwrap_or(0).saturating_sub(1);
     let last = frames.iter().rposition(touching).unwrap_or(frames.len().saturating_sub(1));
     let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
@@ -84,7 +84,7 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
             let acting = forces.into_iter().enumerate().filter(|(_, force)| *force != DVec3::ZERO);
             let forces: Vec<_> = acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect();
             // A store does not say how many nodes are in contact.
-            let contact_nodes = match tick(frame).map_or(0, |tick| tick.contact_nodes) {
+            let contact_nodes = match tick(frame).map_or(0, |tick| tick.sample.contact_nodes) {
                 0 => forces.len() as u32,
                 stored => stored,
             };

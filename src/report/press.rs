@@ -27,7 +27,7 @@ pub fn press(trace: &Trace) -> Canvas {
 pub fn titled(headline: &str, trace: &Trace) -> Canvas {
     let mut lanes =
         per_joint(trace, ["Contact torque on the proxy", "Contact force on the proxy"], true, |tick, joint| {
-            tick.contact_torque.get(joint).copied()
+            tick.sample.torque.get(joint).copied()
         });
     lanes.extend(per_joint(trace, ["Torque on the device", "Force on the device"], true, |tick, joint| {
         tick.device_torque.get(joint).copied()
@@ -37,8 +37,10 @@ pub fn titled(headline: &str, trace: &Trace) -> Canvas {
         Some(tick.proxy.get(joint)? - start.get(joint)?)
     }));
     // A measured dataset knows no nodes.
-    if trace.ticks.iter().all(|tick| !tick.contact) || trace.ticks.iter().any(|tick| tick.contact_nodes > 0) {
-        let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.contact_nodes));
+    if trace.ticks.iter().all(|tick| !tick.sample.contact)
+        || trace.ticks.iter().any(|tick| tick.sample.contact_nodes > 0)
+    {
+        let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.sample.contact_nodes));
         lanes.push(Lane {
             title: "Contacting object nodes [1]".to_owned(),
             curves: vec![nodes],
@@ -132,8 +134,8 @@ fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick
 /// Begin and end of each uninterrupted contact (s).
 pub(super) fn contact_intervals(ticks: &[Tick]) -> Vec<[f64; 2]> {
     ticks
-        .chunk_by(|a, b| a.contact == b.contact)
-        .filter(|run| run[0].contact)
+        .chunk_by(|a, b| a.sample.contact == b.sample.contact)
+        .filter(|run| run[0].sample.contact)
         .map(|run| [run[0].time, run[run.len() - 1].time])
         .collect()
 }

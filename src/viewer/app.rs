@@ -319,7 +319,7 @@ impl Viewer {
     /// Size of the contact torque now (N m); none before the first tick.
     #[must_use]
     pub fn contact_torque(&self) -> Option<f64> {
-        Some(self.session.as_ref()?.history.last()?.contact_torque.norm())
+        Some(self.session.as_ref()?.history.last()?.sample.torque.norm())
     }
 
     /// Returns where the proxy's last node is shown, when the 3-D scene fills `rect`.

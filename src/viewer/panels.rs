@@ -397,7 +397,7 @@ fn felt(ui: &mut Ui, session: &mut Session) {
     ui.separator();
     let units = session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned());
     let sizes = theme::by_unit(units).into_iter().map(|(unit, joints)| {
-        let size = joints.iter().map(|&joint| tick.contact_torque[joint].powi(2)).sum::<f64>().sqrt();
+        let size = joints.iter().map(|&joint| tick.sample.torque[joint].powi(2)).sum::<f64>().sqrt();
         format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
     });
     ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
@@ -418,11 +418,11 @@ fn bar(ui: &Ui) -> Frame {
 
 /// Returns the state of contact in words. `known`: whether the dataset holds the nodes in contact.
 fn contact(tick: &Tick, known: bool) -> String {
-    match tick.contact {
+    match tick.sample.contact {
         _ if tick.flags.contains(Flags::HELD) => "held at the border of the haptized range".into(),
         false if tick.flags.contains(Flags::OUTSIDE) => "free, outside the haptized range".into(),
         false => "free".into(),
-        true if known => format!("{} nodes in contact", tick.contact_nodes),
+        true if known => format!("{} nodes in contact", tick.sample.contact_nodes),
         true => "in contact, nodes not stored".into(),
     }
 }

@@ -161,7 +161,7 @@ impl Plots {
             let lines = joints.iter().flat_map(|&joint| {
                 let name = &axes[joint].name;
                 [
-                    (format!("{name} contact"), joint, false, get(|tick| &tick.contact_torque, joint)),
+                    (format!("{name} contact"), joint, false, get(|tick| &tick.sample.torque, joint)),
                     (format!("{name} device"), joint, true, get(|tick| &tick.device_torque, joint)),
                 ]
             });
@@ -201,9 +201,9 @@ impl Plots {
             "object nodes in contact".to_owned(),
             0,
             false,
-            Box::new(|tick: &Tick| f64::from(tick.contact_nodes)) as Get,
+            Box::new(|tick: &Tick| f64::from(tick.sample.contact_nodes)) as Get,
         );
-        let index = ("contact index × 10".to_owned(), 1, true, Box::new(|tick: &Tick| 10.0 * tick.index) as Get);
+        let index = ("contact index × 10".to_owned(), 1, true, Box::new(|tick: &Tick| 10.0 * tick.sample.index) as Get);
         let mut lines = vec![index];
         if loaded.knows_nodes() {
             lines.insert(0, nodes);

@@ -246,7 +246,7 @@ fn accounts_close_and_sessions_replay_when_the_device_holds_less_than_was_asked_
     let mut device = JointDevice::new(guard, LinearMap::identity(2));
     let ticks = run(&haptics, &mut device, 1500, |_| ());
     assert!(ticks.iter().any(|tick| tick.applied.clamps.contains(Clamps::SIZE)));
-    assert!(ticks.iter().any(|tick| tick.contact && tick.applied.torque[0].abs() > 0.2));
+    assert!(ticks.iter().any(|tick| tick.sample.contact && tick.applied.torque[0].abs() > 0.2));
     assert!(ticks.iter().all(|tick| tick.fault.is_none()), "{:?}", ticks.last());
     assert!(accounts_close(&ticks));
     // The port's work is that of what the device held.
@@ -260,7 +260,7 @@ fn accounts_close_and_sessions_replay_when_the_device_holds_less_than_was_asked_
     let joints = ["a", "b"].map(|name| haptize::dataset::JointLabel { name: name.into(), unit: "rad".into() });
     let trace = Trace { joints: joints.to_vec(), start: all(2, -0.2), ticks, ..Trace::default() };
     let file = tempfile::NamedTempFile::new().unwrap();
-    Recording::of(&trace).write(&trace.joints, &mut file.as_file()).unwrap();
+    Recording::write(&trace, &mut file.as_file()).unwrap();
     let recording = Recording::read(file.path(), 2).unwrap();
     let again = recording.replay(&haptics, None, joints.to_vec()).unwrap();
     assert_eq!(recording.first_difference(&again), None);

@@ -143,7 +143,11 @@ fn feels<F: Firmware + 'static>(mut emulator: Emulator<F>, guard: Guard, middle:
     assert!(halts.is_empty(), "{halts:?}");
     assert!(ticks.iter().all(|tick| tick.fault.is_none()));
     assert!(ticks.iter().skip(1).all(|tick| tick.inputs.age <= 3.0 * PERIOD + 1e-12), "replies are fresh");
-    assert!(ticks[1000..].iter().all(|tick| tick.contact && tick.applied.torque[0] < -0.01), "{:?}", ticks.last());
+    assert!(
+        ticks[1000..].iter().all(|tick| tick.sample.contact && tick.applied.torque[0] < -0.01),
+        "{:?}",
+        ticks.last()
+    );
     assert!(accounts_close(&ticks));
     // The torque that the device holds is the one that was sent, to the resolution of its message.
     let [sent, held] = [&ticks.last().unwrap().applied.torque, &emulator.firmware.torque()];

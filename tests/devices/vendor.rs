@@ -259,10 +259,10 @@ fn the_scheduler_s_thread_runs_the_loop() {
     let halts: Vec<_> = trace.ticks.iter().filter_map(|tick| tick.applied.halt).collect();
     assert!(halts.is_empty(), "no illegal frame, no error: {halts:?}");
     let last = trace.ticks.last().unwrap();
-    assert!(last.contact, "{last:?}");
+    assert!(last.sample.contact, "{last:?}");
     // Torque begins at zero, and again after each pause of a busy machine that makes a sample too old.
     let pauses = trace.ticks.windows(2).filter(|pair| pair[1].time - pair[0].time > LONGEST_AGE).count();
-    let idle = trace.ticks.iter().filter(|tick| tick.contact && tick.applied.torque[0] >= 0.0).count();
+    let idle = trace.ticks.iter().filter(|tick| tick.sample.contact && tick.applied.torque[0] >= 0.0).count();
     assert!(idle <= 1 + pauses, "{idle} ticks in contact without torque, {pauses} pauses");
     assert_eq!(library.effort(), 0.0, "the loop leaves no torque");
     drop(device);

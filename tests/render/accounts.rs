@@ -52,7 +52,7 @@ fn without_input_the_proxy_comes_to_rest_and_the_device_feels_the_contact_torque
     let last = trace.ticks.last().unwrap();
     assert!(last.accounts.kinetic < 1e-20, "{:?}", last.accounts);
     // Springs in series: 5 of the object along the diagonal, 15 of the coupling.
-    for (tau, contact) in last.device_torque.iter().zip(last.contact_torque.iter()) {
+    for (tau, contact) in last.device_torque.iter().zip(last.sample.torque.iter()) {
         assert!((tau - contact).abs() < 1e-9, "{tau} felt, {contact} rendered");
         assert!((tau + 0.3 * 15.0 * 5.0 / 20.0).abs() < 1e-9, "{tau}");
     }

@@ -19,12 +19,13 @@ use haptize as engine;
 use haptize::{
     JointVector,
     contact::{Model, Proximity, Status},
-    dataset::{Contacts, Dataset},
-    device::{Applied, Device, Motion, Reading, Recorded, SimulatedHand},
-    field::{TorqueField, range::HaptizedRange},
+    dataset::{Contacts, Dataset, JointLabel},
+    device::{Applied, Clamps, Device, Halt, Motion, Reading, Recorded, SimulatedHand},
+    field::{Sample, TorqueField, range::HaptizedRange},
     object::Object,
     proxy::Chain,
     render::{
+        accounts::Accounts,
         flags::{Fault, Flags},
         graphics::{ContactForces, Graphics, GraphicsError, ObjectMotion},
         haptic::{Haptics, Inputs, JointsError},
@@ -33,7 +34,7 @@ use haptize::{
         recording::Recording,
         session::{self, Driver, Plan},
         setup::{Setup, SetupError, labels},
-        trace::{Frame, Trace},
+        trace::{Frame, Tick, Trace},
     },
     scene::{
         GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, HapticsSpec, Material, ObjectSpec, Scene, Shape,

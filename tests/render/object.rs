@@ -138,7 +138,7 @@ fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
     // Graphics comes again from a recording, too.
     let mut graphics = Graphics::new(&data, &object, &graphics_60()).unwrap();
     let file = tempfile::NamedTempFile::new().unwrap();
-    Recording::of(&trace).write(&trace.joints, &mut file.as_file()).unwrap();
+    Recording::write(&trace, &mut file.as_file()).unwrap();
     let recording = Recording::read(file.path(), 1).unwrap();
     assert_eq!(recording.replay(&haptics, Some(&mut graphics), labels(&data.grid)).unwrap(), trace);
     // The first frame at or after each instant, each once.

@@ -31,7 +31,7 @@ fn the_papers_press_is_smooth_multi_point_passive_and_repeatable() {
     assert!(summary.leak.abs() < 0.05 * trace.ticks.iter().map(|tick| tick.accounts.stored).fold(0.0, f64::max));
     assert_eq!((summary.faults, summary.absent, summary.unconverged), (0, 0, 0));
     // The layer acts where contact begins and ends, not on the object.
-    let held = trace.ticks.iter().filter(|tick| tick.contact && tick.flags.contains(Flags::LAYER)).count();
+    let held = trace.ticks.iter().filter(|tick| tick.sample.contact && tick.flags.contains(Flags::LAYER)).count();
     assert!(held > 0 && held < 100, "{held} ticks");
     // The object is seen to be dented, and to be round again.
     let moved = |frame: &Frame| {

@@ -29,7 +29,7 @@ fn at_the_end_of_the_grid_the_device_is_held_by_the_coupling() {
         assert!(summary.max_relative_account_residual < 1e-11 && summary.min_absorbed > -1e-12, "{summary:?}");
         assert_eq!((summary.outside, summary.faults), (0, 0));
         let last = trace.ticks.last().unwrap();
-        assert!(!last.contact && last.accounts.stop_work < 0.0, "{last:?}");
+        assert!(!last.sample.contact && last.accounts.stop_work < 0.0, "{last:?}");
         let (mut deepest, mut torque) = (0.0_f64, 0.0_f64);
         for tick in &trace.ticks[..3200] {
             // The deeper the device is, the more it is pushed back: nowhere beyond the border does that end.
@@ -40,7 +40,7 @@ fn at_the_end_of_the_grid_the_device_is_held_by_the_coupling() {
             }
         }
         let held = &trace.ticks[3190];
-        assert!(held.contact && held.flags.contains(Flags::HELD) && !held.flags.contains(Flags::STOPPED));
+        assert!(held.sample.contact && held.flags.contains(Flags::HELD) && !held.flags.contains(Flags::STOPPED));
         for a in 0..joints {
             assert!((held.proxy[a] - 0.6).abs() < 1e-12, "{held:?}");
             assert!((held.device_torque[a] + 15.0 * 0.4).abs() < 1e-9, "{held:?}");
@@ -112,5 +112,5 @@ fn beyond_a_measured_range_a_free_border_is_free_and_one_in_contact_holds() {
     let away = &trace.ticks[990];
     assert!(away.proxy[0] < -1.1 && away.flags.contains(Flags::OUTSIDE) && !away.flags.contains(Flags::HELD));
     let last = trace.ticks.last().unwrap();
-    assert!(last.contact && last.flags.contains(Flags::HELD) && last.proxy[0] <= 0.6, "{last:?}");
+    assert!(last.sample.contact && last.flags.contains(Flags::HELD) && last.proxy[0] <= 0.6, "{last:?}");
 }

@@ -26,6 +26,83 @@ fn a_device_that_moves_as_recorded_is_given_the_recorded_torques_bit_for_bit() {
     }
 }
 
+/// Two ticks of two joints, every column with a number of its own.
+fn marked(solved_meanwhile: bool) -> Trace {
+    let labels = [("a,b", "rad"), ("c", "m")];
+    let joints = labels.map(|(name, unit)| JointLabel { name: name.into(), unit: unit.into() }).into();
+    let mut number = 0.0;
+    let mut next = || {
+        number += 1.0;
+        number
+    };
+    let mut both = || vector(&[next(), next() / 16.0]);
+    let tick = Tick {
+        inputs: Inputs { position: both(), age: 0.25, elapsed: 0.5, interval: 0.75 },
+        hand: both(),
+        device: both(),
+        proxy: both(),
+        device_torque: both(),
+        applied: Applied { torque: both(), clamps: Clamps::SIZE, halt: Some(Halt::Late) },
+        sample: Sample {
+            torque: both(),
+            index: 0.125,
+            contact: true,
+            contact_nodes: 7,
+            energy: 1e-30,
+            share: 0.875,
+            flags: Flags::LAYER,
+        },
+        flags: Flags::LAYER | Flags::HELD,
+        fault: Some(Fault::Late),
+        accounts: Accounts { kinetic: -0.0, ..Accounts::default() },
+        frames: 3,
+        ..Tick::default()
+    };
+    let lost = Inputs { position: vector(&[f64::NAN]), ..tick.inputs };
+    let ticks = vec![tick, Tick { time: 1.5, inputs: lost, restart: true, fault: None, ..tick }];
+    let frames = vec![Frame { time: 0.0, proxy: tick.proxy, nodes: Vec::new() }];
+    Trace { joints, start: vector(&[0.5, -1.0]), ticks, frames, solved_meanwhile }
+}
+
+const TRACE_FILE: &str = "\
+time [s],hand a_b [rad],hand c [m],device a_b [rad],device c [m],proxy a_b [rad],proxy c [m],device torque a_b [N m],\
+device torque c [N],held torque a_b [N m],held torque c [N],contact torque a_b [N m],contact torque c [N],\
+contact index,contact,contact nodes,flags,fault,clamps,halt,initial [J],kinetic [J],spring [J],bristles [J],\
+coupling work [J],channel work [J],field work [J],stop work [J],proxy dissipation [J],coupling dissipation [J],\
+friction dissipation [J],contact dissipation [J],control dissipation [J],residual [J],exchanged [J],stored [J],\
+first stored [J],leak [J],port work [J],device dissipation [J]
+";
+
+/// What a program that was written for these files relies on: names, units, order, and how numbers are spelt.
+#[test]
+fn files_of_a_session_have_the_columns_that_programs_know() {
+    let trace = marked(false);
+    let mut written = Vec::new();
+    trace.write_ticks(&mut written).unwrap();
+    let text = String::from_utf8(written).unwrap();
+    let (fault, halt) = (Fault::Late, Halt::Late);
+    let start = "3,0.25,5,0.375,7,0.5,9,0.625,11,0.75,13,0.875,0.125,1,7,136";
+    let end = "0,-0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,,0,0,0";
+    assert_eq!(text, format!("{TRACE_FILE}0,{start},{fault},1,{halt},{end}\n1.5,{start},,1,{halt},{end}\n"));
+
+    let recorded = |solved_meanwhile: bool| {
+        let mut written = Vec::new();
+        Recording::write(&marked(solved_meanwhile), &mut written).unwrap();
+        let text = String::from_utf8(written).unwrap();
+        text.split_once('\n').unwrap().1.to_owned()
+    };
+    let head = "# start,0.5,-1\n# frames,0\nelapsed [s],interval [s],age [s],restart,frames,position a_b [rad],\
+                position c [m],hand a_b [rad],hand c [m],torque a_b [N m],torque c [N],proxy a_b [rad],proxy c [m],\
+                held a_b [N m],held c [N]";
+    let rest = "3,0.25,9,0.625,7,0.5,11,0.75";
+    let [first, second] = [format!("0.5,0.75,0.25,0,3,1,0.125,{rest}"), format!("0.5,0.75,0.25,1,3,NaN,,{rest}")];
+    assert_eq!(recorded(false), format!("{head}\n{first}\n{second}\n"));
+    let felt = "contact torque a_b [N m],contact torque c [N],contact index,contact,contact nodes,energy [J],share,\
+                remarks";
+    let numbers = "13,0.875,0.125,1,7,0.000000000000000000000000000001,0.875,8";
+    assert_eq!(recorded(true), format!("{head},{felt}\n{first},{numbers}\n{second},{numbers}\n"));
+}
+
 /// A session as it happens at its worst: ticks that come early and late, a device that fails twice, a fault cleared.
 fn eventful(haptics: &Haptics) -> Trace {
     let mut positions: Vec<JointVector> = (0..600).map(|k| all(2, 0.3 * (0.02 * f64::from(k)).sin())).collect();
@@ -58,7 +135,7 @@ fn a_recorded_session_replays_bit_for_bit_with_its_faults() {
     assert_eq!(reasons, [None, Some(Fault::NotFinite), Some(Fault::NotFinite), None, Some(Fault::Joints)]);
 
     let file = tempfile::NamedTempFile::new().unwrap();
-    Recording::of(&trace).write(&trace.joints, &mut file.as_file()).unwrap();
+    Recording::write(&trace, &mut file.as_file()).unwrap();
     let recording = Recording::read(file.path(), 2).unwrap();
     let again = recording.replay(&haptics, None, labels(&data.grid)).unwrap();
     assert_eq!(recording.first_difference(&again), None);
@@ -85,6 +162,10 @@ fn files_that_are_no_recording_are_refused_with_their_line() {
         Recording::read(file.path(), 2).map_err(|error| error.to_string())
     };
     assert_eq!(read(good).unwrap().ticks(), 1);
+    let felt = "0.001,0.001,0,0,0,1,1,1,1,1,1,1,1,1,1,0.5,0.5,1,1,4,1e-3,1,0\n";
+    assert_eq!(read(&(good[..28].to_owned() + felt)).unwrap().ticks(), 1);
+    let mixed = read(&(good.to_owned() + felt)).unwrap_err();
+    assert!(mixed.contains(":4: another number of fields than above") && mixed.contains("--record"), "{mixed}");
     for (old, new, expected) in [
         ("0.001,0.001,0,0,0,1", "0.001,0.001,0,0,0,1,1", ":3: 16 fields in the place of 15"),
         ("0.001,0.001,0,0,0,1", "0.001,x,0,0,0,1", ":3: \"x\" is not such a number"),

@@ -11,8 +11,10 @@ use haptize::{
     render::{
         live::{Answers, Followed, Live},
         on_demand::OnDemand,
+        recording::Recording,
         session::{Driver, SessionError},
-        setup::Setup,
+        setup::{Setup, labels},
+        trace::Trace,
     },
     scene::Waypoint,
     store::{Space, Store},
@@ -102,13 +104,38 @@ fn session(
 }
 
 #[test]
+fn a_session_on_demand_is_replayed_as_it_was_felt_wherever_its_store_has_come_since() {
+    let world = World::new();
+    let setup = Setup::new(&world.dataset(&world.store())).unwrap();
+    let mut trace = Trace { joints: labels(&grid_of(&world.scene)), ..Trace::default() };
+    trace.solved_meanwhile = true;
+    trace.start = world.motion(4, 24).at(0.0).0;
+    let (answers, _) = session(24, 4, 400, |tick| trace.ticks.push(*tick));
+    assert!(answers.changes > 0 && trace.ticks.iter().any(|tick| tick.sample.contact), "{answers:?}");
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let replayed = |trace: &Trace| {
+        Recording::write(trace, &mut file.as_file()).unwrap();
+        let recording = Recording::read(file.path(), 2).unwrap();
+        let again = recording.replay(&setup.haptics, None, trace.joints.clone()).unwrap();
+        (recording.first_difference(&again), again)
+    };
+    let (difference, again) = replayed(&trace);
+    assert_eq!(difference, None);
+    assert!(again == trace);
+    // The store by itself, in which nothing was solved, says something else.
+    file.as_file().set_len(0).unwrap();
+    std::io::Seek::rewind(&mut file.as_file()).unwrap();
+    assert!(replayed(&Trace { solved_meanwhile: false, ..trace }).0.is_some());
+}
+
+#[test]
 fn what_arrives_while_it_is_felt_makes_no_jump_and_no_energy_from_nowhere() {
     let mut changes = 0;
     for seed in [24, 25, 26] {
         let mut before: Option<JointVector> = None;
         let (mut steepest, mut contact) = (0.0_f64, 0);
         let (answers, _) = session(seed, 20, 400, |tick| {
-            assert!(tick.contact_torque.is_finite() && tick.fault.is_none(), "{tick:?}");
+            assert!(tick.sample.torque.is_finite() && tick.fault.is_none(), "{tick:?}");
             let accounts = &tick.accounts;
             // The field, arrivals included, gives no more than the proxy's damping takes.
             assert!(accounts.created() <= accounts.taken_from_field() + 1e-12, "{accounts:?}");
@@ -116,10 +143,10 @@ fn what_arrives_while_it_is_felt_makes_no_jump_and_no_energy_from_nowhere() {
             assert!(accounts.device_port().unwrap() > -1e-9, "{accounts:?}");
             if let Some(before) = before {
                 // The turning joint's, in N m.
-                steepest = steepest.max((tick.contact_torque[0] - before[0]).abs());
+                steepest = steepest.max((tick.sample.torque[0] - before[0]).abs());
             }
-            before = Some(tick.contact_torque);
-            contact += usize::from(tick.contact);
+            before = Some(tick.sample.torque);
+            contact += usize::from(tick.sample.contact);
         });
         assert_eq!(answers.ticks, 20_000);
         assert_eq!(answers.by_levels.iter().sum::<u64>(), answers.ticks);

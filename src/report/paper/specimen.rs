@@ -66,8 +66,7 @@ fn picture(scanned: Scanned<'_>) -> Picture {
     };
     let configurations = scanned.samples.configurations.chunks_exact(chain.joints.len());
     let dots: Vec<DVec3> = configurations.map(&mut visited).filter(|&x| !holds(&block, x)).collect();
-    let by_torque =
-        scanned.trace.ticks.iter().max_by(|a, b| a.contact_torque.norm().total_cmp(&b.contact_torque.norm()));
+    let by_torque = scanned.trace.ticks.iter().max_by(|a, b| a.sample.torque.norm().total_cmp(&b.sample.torque.norm()));
     let pressed = by_torque.map(|tick| {
         let mut pose = chain.new_pose();
         chain.pose(&tick.proxy, &mut pose);

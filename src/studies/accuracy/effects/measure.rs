@@ -104,7 +104,7 @@ pub fn price(scene: &Scene, rounds: usize, progress: &mut dyn FnMut(&str)) -> Re
         dataset_bytes: sizes[k],
     };
     let least = |times: &Times, k: usize| times[k].as_ref().map(|times| Cost::of(times).least);
-    let contacts = felt.ticks.iter().filter(|tick| tick.contact).count();
+    let contacts = felt.ticks.iter().filter(|tick| tick.sample.contact).count();
     Ok(Effects {
         baseline: Baseline {
             bake: least(&bakes, PLAIN).unwrap_or(0.0),

@@ -229,7 +229,7 @@ pub const RECORDINGS: Target = Target {
         let plan = setup.plan(dataset, 0.03, 2);
         let trace = session::run(&setup.haptics, &mut hand, graphics.as_mut(), &plan).unwrap();
         let mut bytes = Vec::new();
-        Recording::of(&trace).write(&labels(&dataset.grid), &mut bytes).unwrap();
+        Recording::write(&trace, &mut bytes).unwrap();
         vec![bytes]
     },
     mutate: mutate::text,
