@@ -8,12 +8,12 @@ use super::{
     job::{Job, JobResult, Solver, Task},
     lead::DeviceChoice,
     plots::Plots,
-    scene::{SceneView, Shown},
+    scene::SceneView,
     session::Session,
 };
 use crate::{
     JointVector,
-    gpu::{ADAPTER_VARIABLE, Context, GpuError},
+    gpu::{Context, GpuError},
     input,
     render::{on_demand::OnDemand, timing::Timing},
     scene::Scene,
@@ -77,18 +77,6 @@ pub struct Viewer {
     still: f64,
 }
 
-/// The state that outlives a window: all but its graphics.
-pub struct Rescue {
-    /// The open session, whose loop goes on.
-    session: Option<Session>,
-    device: Option<DeviceChoice>,
-    /// The task that was under way.
-    task: Option<Task>,
-    solver: Solver,
-    shown: Shown,
-    theme: egui::ThemePreference,
-}
-
 /// Samples a pixel of the 3-D scene, for smooth edges.
 const SAMPLES: u32 = 4;
 
@@ -148,39 +136,6 @@ impl Viewer {
                 None
             }
         }
-    }
-
-    /// Returns the state from which a window on another device can [`Viewer::resume`].
-    pub fn rescue(&mut self, egui: &egui::Context) -> Rescue {
-        Rescue {
-            session: self.session.take(),
-            device: self.device.clone(),
-            task: self.job.take().map(|job| job.task.clone()),
-            solver: self.solver.clone(),
-            shown: self.scene.shown,
-            theme: egui.options(|options| options.theme_preference),
-        }
-    }
-
-    /// Goes on where another window had to stop because its device was lost, and says `why`. What was being made is
-    /// begun again.
-    pub fn resume(&mut self, rescue: Rescue, why: &str, egui: &egui::Context) {
-        egui.set_theme(rescue.theme);
-        (self.session, self.device) = (rescue.session, rescue.device);
-        (self.solver, self.scene.shown) = (rescue.solver, rescue.shown);
-        if let Some(session) = &mut self.session {
-            let egui = egui.clone();
-            session.move_to(&self.context, move || egui.request_repaint());
-            self.scene.look_at(&session.loaded);
-        }
-        if let Some(task) = rescue.task {
-            self.begin(task, egui);
-        }
-        self.error = Some(format!(
-            "The GPU that drew this window was lost ({why}). It was opened again; what was felt went on meanwhile. \
-             Update the GPU's driver if this comes back, or draw on another adapter: set {ADAPTER_VARIABLE} to a part \
-             of its name before haptize starts; haptize doctor lists them"
-        ));
     }
 
     /// The flag that ends the session of the device that leads, where there is one.

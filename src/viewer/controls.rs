@@ -57,11 +57,6 @@ impl Controls {
         (self.solver, self.bake_on_change) = (before.solver.clone(), before.bake_on_change);
     }
 
-    /// Prices everything again, on another device.
-    pub fn price_anew(&mut self, loaded: &Loaded, context: &Arc<Context>, wake: impl Fn() + Send + 'static) {
-        self.prices = Prices::measure(loaded, context, wake);
-    }
-
     /// Waits until everything is priced; for pictures and tests.
     pub fn wait(&mut self) {
         self.prices.wait();

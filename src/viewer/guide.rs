@@ -1,9 +1,8 @@
 //! Who leads the hand: the pointer, keys, or one of the scene's motions, which plays, pauses and can be scrubbed.
 
-use super::{approach, loaded::Loaded};
-use crate::{JointVector, MAX_JOINTS, dataset::Dataset, device::Motion};
+use super::loaded::Loaded;
+use crate::{JointVector, MAX_JOINTS, device::Motion, scene::Waypoint};
 use eframe::egui;
-use std::sync::Arc;
 
 /// The target that the simulated hand follows. The caller passes the time; this type reads no clock.
 #[derive(Clone)]
@@ -25,8 +24,6 @@ pub struct Guide {
     home: JointVector,
     /// The way there, or to where the motion begins, and the time in it (s), while the hand takes it.
     approach: Option<(Motion, f64)>,
-    /// The free space that this way leads through; absent: it is straight.
-    space: Option<Arc<Dataset>>,
     /// Keys that are held; none while the window has not the keyboard.
     keys: Option<Keys>,
     /// Since the window last said so (s).
@@ -45,6 +42,9 @@ pub struct Keys {
     /// Whether the hand is to go back to where it was at first.
     pub home: bool,
 }
+
+/// Time in which the hand is led to where a motion begins, or home (s).
+const LEAD_IN: f64 = 0.8;
 
 /// How far a key moves a joint in a second, as a share of its range (1/s): all of it in four
 /// seconds, slowly enough to press with care.
@@ -75,7 +75,6 @@ impl Guide {
             handed_over: false,
             home: loaded.start(),
             approach: None,
-            space: Some(Arc::clone(&loaded.dataset)),
             keys: None,
             silence: 0.0,
             window: None,
@@ -144,10 +143,11 @@ impl Guide {
         self.play(number);
     }
 
-    /// Takes the hand to `end` by a way through free space, where there is one.
+    /// Takes the hand straight to `end`.
     fn take_to(&mut self, end: JointVector) {
-        let way = || approach::way(self.space.as_deref(), &self.goal, &end).map(|way| (way, 0.0));
-        self.approach = if self.goal == end { None } else { way() };
+        let ends = [Waypoint { time: 0.0, q: self.goal }, Waypoint { time: LEAD_IN, q: end }];
+        let way = Motion::through(&ends, end.len()).ok().filter(|_| self.goal != end);
+        self.approach = way.map(|way| (way, 0.0));
     }
 
     /// Stops the motion where it is, or lets it go on.
@@ -244,8 +244,7 @@ impl Guide {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::approach::LEAD_IN, *};
-    use crate::scene::Waypoint;
+    use super::*;
 
     /// A hand at rest in the middle of two joints, of whose limits the second's are closer; the window has the keyboard
     /// and says so.
@@ -261,7 +260,6 @@ mod tests {
             handed_over: false,
             home,
             approach: None,
-            space: None,
             keys: Some(Keys::default()),
             silence: f64::NEG_INFINITY,
             window: None,

@@ -118,9 +118,7 @@ pub enum JobResult {
 
 /// A job under way. Dropping it cancels it.
 pub struct Job {
-    /// The work that it does.
-    pub task: Task,
-    /// The same, for its progress bar.
+    /// The work that it does, for its progress bar.
     pub title: String,
     progress: Progress,
     stop: Arc<AtomicBool>,
@@ -152,14 +150,13 @@ impl Job {
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, reports) = mpsc::channel();
         let flag = Arc::clone(&stop);
-        let asked = task.clone();
         let work = move || {
             let mut progress = |progress| {
                 // A window that is gone needs no news.
                 let _ = sender.send(Report::Progress(progress));
                 wake();
             };
-            let outcome = match run(asked, &solver, &context, &flag, &mut progress) {
+            let outcome = match run(task, &solver, &context, &flag, &mut progress) {
                 Ok(loaded) => JobResult::Loaded(Box::new(loaded)),
                 Err(error) if is_cancelled(error.as_ref()) => JobResult::Cancelled,
                 Err(error) => JobResult::Failed(remedied(&error.to_string(), ON_THE_CPU)),
@@ -169,7 +166,7 @@ impl Job {
         };
         spawn("bake", work)?;
         let progress = Progress::default();
-        Ok(Self { task, title, progress, stop, reports })
+        Ok(Self { title, progress, stop, reports })
     }
 
     /// Takes the news; answers with the outcome once it is over.

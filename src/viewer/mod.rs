@@ -8,7 +8,6 @@
 //! | `theme`, `palette` | sizes and type, colours |
 //! | `loaded`, `job`, `background` | what is open, how it is baked or read, and what the window must not wait for |
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
-//! | `approach` | the way to where a motion begins |
 //! | `lead` | a haptic device that leads in the place of all these |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
 //! | `steering`, `node_drag`, `camera` | whence it is seen, and the pointer's grip on the proxy |
@@ -21,7 +20,6 @@
 //! haptic thread waits for nothing here; see `feel`.
 
 mod app;
-mod approach;
 mod background;
 mod body;
 mod camera;
@@ -57,7 +55,7 @@ mod theme;
 mod view_renderer;
 mod window;
 
-pub use app::{Rescue, Start, Viewer};
+pub use app::{Start, Viewer};
 pub use eframe::egui_wgpu::RenderState;
 pub use feel::TickSource;
 pub use lead::DeviceChoice;
@@ -91,7 +89,7 @@ pub enum ViewError {
          info need neither"
     )]
     NoAdapter(String),
-    /// It was lost, and no other window can be opened instead.
+    /// It was lost, and the window with it.
     #[error(
         "the GPU that draws the window was lost, and the window with it: {0}. Start haptize view again; if this comes \
          back, update the GPU's driver, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name; \

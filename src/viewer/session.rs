@@ -96,13 +96,6 @@ impl Session {
         })
     }
 
-    /// Makes again what belongs to a window and a device that are gone; the loop goes on. `context` is the new one,
-    /// `wake` is called when there is news.
-    pub fn move_to(&mut self, context: &Arc<Context>, wake: impl Fn() + Send + 'static) {
-        self.slices.forget_picture();
-        self.controls.price_anew(&self.loaded, context, wake);
-    }
-
     /// Plane and cloud of C-space, one below the other, or one of them where there is no height for both.
     pub fn configuration_space(&mut self, ui: &mut Ui, q: &JointVector) {
         let both = ui.available_height() > ROOM_FOR_BOTH;

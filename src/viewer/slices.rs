@@ -66,11 +66,6 @@ impl Slices {
         Self { column: Column::Torque(axes[0]), axes, follow: true, lines, drawn: None }
     }
 
-    /// Draws its picture again: the window that had it is gone.
-    pub fn forget_picture(&mut self) {
-        self.drawn = None;
-    }
-
     /// The panel, `height` points of it. The heat map has what the sliders of many joints leave of that; where it would
     /// be too low one scrolls.
     pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
