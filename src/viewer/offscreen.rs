@@ -75,7 +75,7 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
     dress(&egui);
     let mut viewer = Viewer::new(Arc::clone(&context), render.clone(), TickSource::Steps, PathBuf::from("."))?;
     viewer.start(start, &egui);
-    viewer.wait(&egui);
+    viewer.wait();
     if let Some(error) = viewer.error() {
         return Err(ViewError::Open(error.to_owned()));
     }
