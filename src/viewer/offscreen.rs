@@ -4,8 +4,8 @@
 use super::{Start, TickSource, ViewError, Viewer, dress, pixels, theme};
 use crate::{
     dataset::replace_file,
+    draw::canvas::encode_png,
     gpu::{AdapterChoice, Context, GpuError},
-    report::canvas::encode_png,
 };
 use eframe::{
     egui::{self, Pos2, Rect, Theme, vec2},

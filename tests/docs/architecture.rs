@@ -16,7 +16,6 @@ const SHARED_NAMES: &[&str] = &[
     "Arguments",
     "Body",
     "Camera",
-    "Colour",
     "Column",
     "Contact",
     "Contacts",

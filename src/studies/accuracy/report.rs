@@ -3,14 +3,13 @@
 use super::{Accuracy, Row, Study, limits, offers};
 use crate::{
     csv::{Table, quoted},
-    report::{
-        ReportError,
+    draw::{
         canvas::Canvas,
         colour,
         diagram::{Diagram, Series},
         plot::{Entry, Mark},
-        write, write_both,
     },
+    report::{ReportError, write, write_both},
     scene::{Algorithm, Interpolation},
 };
 use std::{
