@@ -18,12 +18,13 @@ use haptize::{
     contact::{Model, Solver},
     dataset::Grid,
     device::Motion,
-    proxy::Chain,
-    report::{
+    draw::{
+        colour,
         diagram::{Diagram, Series},
         plot::{Entry, Mark},
-        {colour, write_both},
     },
+    proxy::Chain,
+    report::write_both,
     scene::{ProxyNodeSpec, Scene},
     store::{Space, Store, record::width},
     sweep::{

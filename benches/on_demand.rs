@@ -14,6 +14,11 @@ use haptize::{
     contact::{Model, Solver, Status},
     dataset::{Dataset, Provenance},
     device::{Device, Motion, Recorded},
+    draw::{
+        colour,
+        diagram::{Diagram, Series},
+        plot::{Entry, Mark},
+    },
     proxy::Chain,
     render::{
         live::{Followed, Live, LiveEnds},
@@ -21,12 +26,7 @@ use haptize::{
         setup::Setup,
         trace::Tick,
     },
-    report::{
-        colour,
-        diagram::{Diagram, Series},
-        plot::{Entry, Mark},
-        write_both,
-    },
+    report::write_both,
     scene::{Scene, Waypoint},
     store::{Space, Store},
     sweep::{

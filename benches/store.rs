@@ -19,13 +19,11 @@ use haptize::{
     JointVector, MAX_JOINTS,
     contact::{Model, Status},
     dataset::{Axis, Dataset, Grid, Provenance},
+    draw::diagram::{Diagram, Series},
     field::TorqueField,
     proxy::Chain,
     render::haptic::{Haptics, Inputs},
-    report::{
-        diagram::{Diagram, Series},
-        write_both,
-    },
+    report::write_both,
     scene::{Interpolation, JointKind, Scene},
     store::{
         Nodes, Place, Space, Store,

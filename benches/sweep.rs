@@ -8,12 +8,13 @@ use haptize::{
     JointVector,
     contact::{Model, Proximity, Solver, Status},
     dataset::{Axis, Grid},
+    draw::{
+        chart::{Curve, Lane, Stack},
+        colour,
+    },
     object::Object,
     proxy::Chain,
-    report::{
-        chart::{Curve, Lane, Stack},
-        colour, write_both,
-    },
+    report::write_both,
     scene::{Algorithm, JointKind, Scene, Shape},
     sweep::{Backend, CpuBackend, FreeSpace},
 };

@@ -35,7 +35,7 @@ fn main() {
         .build_ui_state(|ui, viewer: &mut Viewer| viewer.ui(ui), viewer);
     let ctx = harness.ctx.clone();
     harness.state_mut().start(&Start::Sphere, &ctx);
-    harness.state_mut().wait(&ctx);
+    harness.state_mut().wait();
     assert_eq!(harness.state().error(), None);
     println!("drawn by {}; jitter [us] of ticks at 1 kHz, one row a turn of {} s", context.adapter(), TURN.as_secs());
     println!("{:>22} {:>10} {:>10} {:>10} {:>10}", "", "median", "99 %", "99.9 %", "most");

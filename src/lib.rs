@@ -93,6 +93,7 @@ pub mod device;
 
 pub mod render;
 
+pub mod draw;
 pub mod report;
 
 pub mod studies;

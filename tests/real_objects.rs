@@ -6,14 +6,14 @@ use glam::DVec3;
 use haptize::{
     dataset::Dataset,
     device::Motion,
-    gridize::{GridizeOptions, Interpolation, gridize},
+    gridize::{
+        GridizeOptions, Interpolation, gridize,
+        prediction::{held_out, predict},
+    },
     logs::{Imported, Keep, Mapping, import},
     proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
-    report::{
-        force::EndForce,
-        prediction::{held_out, predict},
-    },
+    report::force::EndForce,
     scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{PlanSpec, ScanScene, Waypoint, WorkspacePlan},
 };

@@ -8,6 +8,7 @@ use haptize::{
     contact::Status,
     dataset::{Axis, Contacts, Dataset, Grid, JointLabel, Provenance, Surface},
     device::Applied,
+    draw::canvas::{Anchor, Canvas, TextStyle, Weight},
     field::Sample,
     object::Object,
     proxy::{Chain, Node as ProxyNode},
@@ -17,10 +18,7 @@ use haptize::{
         timing::{Durations, Timing},
         trace::{Frame, Tick, Trace},
     },
-    report::{
-        self,
-        canvas::{Anchor, Canvas, TextStyle, Weight},
-    },
+    report::{self},
     scene::{GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec},
 };
 use resvg::{
@@ -212,8 +210,8 @@ fn folder(name: &str) -> PathBuf {
 fn parsed(svg: &str) -> Tree {
     let mut options = Options::default();
     let fonts = [
-        &include_bytes!("../src/report/fonts/Roboto-Regular.ttf")[..],
-        include_bytes!("../src/report/fonts/Roboto-Medium.ttf"),
+        &include_bytes!("../src/draw/fonts/Roboto-Regular.ttf")[..],
+        include_bytes!("../src/draw/fonts/Roboto-Medium.ttf"),
     ];
     fonts.into_iter().for_each(|font| options.fontdb_mut().load_font_data(font.to_vec()));
     Tree::from_str(svg, &options).unwrap()
@@ -410,7 +408,8 @@ fn no_text_is_clipped_or_overlapped_for_one_to_six_joints() {
 
 #[test]
 fn the_check_for_misplaced_text_finds_it() {
-    let style = TextStyle { size: 12.0, weight: Weight::Regular, colour: report::colour::INK, anchor: Anchor::Start };
+    let style =
+        TextStyle { size: 12.0, weight: Weight::Regular, colour: haptize::draw::colour::INK, anchor: Anchor::Start };
     let mut canvas = Canvas::new(200.0, 100.0);
     canvas.text((10.0, 50.0), "fits", style);
     assert!(misplaced_text(&canvas).is_empty());
@@ -427,11 +426,11 @@ fn the_press_has_a_curve_for_every_joint_and_shades_every_contact() {
     let svg = report::press::press(&trace).svg();
     for joint in 0..3 {
         // A curve and a legend entry in each of three panels; the first colour also draws the number of nodes.
-        let strokes = svg.matches(&format!(r#"stroke="{}""#, report::colour::series(joint))).count();
+        let strokes = svg.matches(&format!(r#"stroke="{}""#, haptize::draw::colour::series(joint))).count();
         assert_eq!(strokes, 6 + usize::from(joint == 0));
     }
     let contacts = trace.ticks.windows(2).filter(|pair| !pair[0].sample.contact && pair[1].sample.contact).count();
-    let shades = svg.matches(&format!(r#"fill="{}""#, report::colour::SHADE)).count();
+    let shades = svg.matches(&format!(r#"fill="{}""#, haptize::draw::colour::SHADE)).count();
     assert_eq!(contacts, 2);
     assert_eq!(shades, 4 * contacts + 1, "four panels and the legend");
     for title in

@@ -14,12 +14,11 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   haptize accuracy sphere.toml
-  haptize accuracy sphere.toml --points 20000 --configurations 500     less time, rougher figures
-  haptize accuracy sphere.toml --effects                               also what each effect costs")]
+  haptize accuracy sphere.toml --points 20000 --configurations 500     less time, rougher figures")]
 pub struct Arguments {
     /// The scene's file.
     scene: PathBuf,
-    /// The folder to write figures, table and page to.
+    /// The folder to write figures and table to.
     #[arg(short, long, default_value = "out/accuracy")]
     output: PathBuf,
     /// Number of random configurations that are solved as the reference.
@@ -31,9 +30,6 @@ pub struct Arguments {
     /// Number of timed runs of each measurement; the fastest counts.
     #[arg(long, default_value_t = 5)]
     rounds: usize,
-    /// Also measure what every effect costs: in baking, in a tick and in a frame.
-    #[arg(long)]
-    effects: bool,
 }
 
 /// Measures the scene and writes what was found.
@@ -47,10 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = Folder::check(&arguments.output, accuracy::FILES, [arguments.scene.as_path()])?;
     let mut progress = |what: &str| tell(format_args!("haptize: {what} ..."));
     let scene = reach::complete(scene, BackendChoice::Cpu, false)?;
-    let mut found = accuracy::measure(&scene, extent, &mut progress)?;
-    if arguments.effects {
-        found.effects = Some(accuracy::effects::price(&scene, extent.rounds, &mut progress)?);
-    }
+    let found = accuracy::measure(&scene, extent, &mut progress)?;
     let files = accuracy::write_all(&arguments.output, &found)?;
     let mut json = serde_json::to_value(&found)?;
     json["offers"] = serde_json::to_value(accuracy::offers(&found))?;

@@ -12,11 +12,11 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, replace_file},
+    draw::canvas::Canvas,
     gridize::{GridizeOptions, Interpolation},
     render::{setup::Setup, trace::Trace},
     report::{
         self,
-        canvas::Canvas,
         force::{EndForce, force},
         gridized::gridized,
         object,

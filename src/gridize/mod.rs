@@ -16,6 +16,7 @@ mod interpolant;
 mod line;
 mod order;
 mod plane;
+pub mod prediction;
 mod samples;
 mod smooth;
 mod space;

@@ -4,13 +4,14 @@
 //! A chain of three joints turns torque into force without ambiguity: tau = J^T F, so F = J^-T tau with J the Jacobian
 //! of the last contact node.
 
-use super::{
-    canvas::Canvas,
-    chart::{Curve, Lane, Stack},
-    colour, press,
-};
+use super::press;
 use crate::{
     JointVector,
+    draw::{
+        canvas::Canvas,
+        chart::{Curve, Lane, Stack},
+        colour,
+    },
     proxy::Chain,
     render::trace::{Tick, Trace},
 };

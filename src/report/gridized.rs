@@ -4,15 +4,19 @@
 //! Two joints span the sheet. Of further joints a slab is shown, half a grid step to either side of a grid line: that
 //! in which most grid points are in contact. Points outside the measured region are left out, as in the dataset.
 
-use super::{
-    canvas::{Anchor, Area, Canvas},
-    chart,
-    colour::ColourMap,
-    plot::{self, Panel, Scale},
-    press::subscript,
-    ticks,
+use super::press::subscript;
+use crate::{
+    contact::Status,
+    dataset::Dataset,
+    draw::{
+        canvas::{Anchor, Area, Canvas},
+        chart,
+        colour::ColourMap,
+        plot::{self, Panel, Scale},
+        ticks,
+    },
+    gridize::Samples,
 };
-use crate::{contact::Status, dataset::Dataset, gridize::Samples};
 use std::collections::BTreeMap;
 
 const WIDTH: f64 = 860.0;

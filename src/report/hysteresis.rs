@@ -1,14 +1,16 @@
 //! The two branches of a mechanism with friction: torque against the position of the joint that leads, moving up and
 //! moving down.
 
-use super::{
-    canvas::{Area, Canvas},
-    chart, colour,
-    plot::{self, Entry, Mark, Panel, Scale},
-    press::subscript,
-    ticks,
+use super::press::subscript;
+use crate::{
+    draw::{
+        canvas::{Area, Canvas},
+        chart, colour,
+        plot::{self, Entry, Mark, Panel, Scale},
+        ticks,
+    },
+    gridize::Samples,
 };
-use crate::gridize::Samples;
 
 const WIDTH: f64 = 760.0;
 const LANE: f64 = 210.0;

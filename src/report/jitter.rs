@@ -1,7 +1,9 @@
 //! How late the ticks of the real-time loop came.
 
-use super::{canvas::Canvas, chart::Histogram, ticks};
-use crate::render::timing::Timing;
+use crate::{
+    draw::{canvas::Canvas, chart::Histogram, ticks},
+    render::timing::Timing,
+};
 
 /// Histogram of the lateness of ticks, quantiles as dashed lines.
 #[must_use]

@@ -1,35 +1,23 @@
 //! Figures of a bake and of a press, drawn without a display, a GPU or a system font.
 //!
-//! [`canvas`] is the paper sheet (SVG, and the same sheet rasterised to PNG), [`plot`] draws charts and heat maps on
-//! it, [`raster`] draws solid bodies; [`prediction`] holds a dataset against measurements, for a figure and for
-//! `haptize gridize`. The figures themselves are functions of the library's types; none of them knows
-//! how the data came about.
+//! The figures are functions of the library's types; none of them knows how the data came about.
 
-pub mod canvas;
-pub mod chart;
-pub mod colour;
-pub mod diagram;
-mod font;
 pub mod force;
 pub mod gridized;
 pub mod hysteresis;
 pub mod jitter;
 pub mod object;
 pub mod paper;
-pub mod plot;
-pub mod prediction;
 pub mod press;
-pub mod raster;
 pub mod slices;
 pub mod space;
-pub(crate) mod ticks;
 
 use crate::{
     dataset::{Dataset, replace_file},
+    draw::canvas::{Canvas, PictureError},
     proxy::Chain,
     render::trace::Trace,
 };
-use canvas::Canvas;
 use rayon::prelude::*;
 use std::{
     io::Write,
@@ -55,15 +43,8 @@ pub enum ReportError {
         source: std::io::Error,
     },
     /// The sheet could not be rasterised.
-    #[error("cannot rasterise a figure of {width} x {height} pixels: {reason}; ask for a smaller scale")]
-    Rasterise {
-        /// Pixels across.
-        width: u32,
-        /// Pixels down.
-        height: u32,
-        /// The rasteriser's message.
-        reason: String,
-    },
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// The data cannot be drawn at all: their parts contradict each other.
     #[error("cannot draw {figure}: {reason}")]
     Data {

@@ -1,18 +1,19 @@
 //! The deformed object with the proxy at a few instants (paper's Fig. 6), coloured by displacement, with the contact
 //! forces as arrows.
 
-use super::{
-    PIXELS, ReportError,
-    canvas::{Anchor, Area, Canvas, Picture},
-    chart,
-    colour::{Colour, ColourMap, GRID, INK},
-    plot::{self, Entry, Mark},
-    raster::{Camera, Raster},
-    ticks,
-};
+use super::{PIXELS, ReportError};
 use crate::{
     contact::NodeForce,
     dataset::Dataset,
+    draw::{
+        canvas::{Anchor, Area, Canvas, Picture},
+        chart,
+        colour::{Colour, ColourMap, GRID, INK},
+        plot::{self, Entry, Mark},
+        raster::{Camera, Raster},
+        solid::{self, Cone},
+        ticks,
+    },
     proxy::{Chain, Pose, Triangles, shape_frame, shape_triangles},
     render::{
         graphics::ContactForces,
@@ -224,9 +225,9 @@ impl<'a> Scene<'a> {
         let nodes = &instant.nodes[..self.rest.len()];
         raster.mesh(nodes, self.triangles, &colours);
         draw_proxy(&mut raster, self.chain, &instant.pose, 0.032 * self.radius, &self.links);
-        for (tail, tip) in self.arrows(instant) {
-            raster.arrow(tail, tip, 0.022 * self.radius, FORCE);
-        }
+        let arrows = self.arrows(instant).into_iter();
+        let arrows = arrows.flat_map(|(tail, tip)| Cone::arrow(tail, tip - tail, 0.022 * self.radius, FORCE));
+        raster.cones(&arrows.collect::<Vec<_>>());
         raster.edges(nodes, self.triangles, 1.2, EDGE);
         raster.picture()
     }
@@ -238,8 +239,7 @@ fn links(dataset: &Dataset) -> Vec<(Option<usize>, Triangles)> {
     shapes.iter().map(|shape| (shape.joint, shape_triangles(shape))).collect()
 }
 
-/// Draws the links with their shapes, and those that have none from joint to joint, the last one to its farthest node,
-/// with the contact nodes on them.
+/// Draws the links with their shapes, and those that have none from joint to joint, with the contact nodes on them.
 pub(super) fn draw_proxy(
     raster: &mut Raster,
     chain: &Chain,
@@ -252,19 +252,9 @@ pub(super) fn draw_proxy(
         let nodes: Vec<DVec3> = nodes.iter().map(|node| frame.transform_point3(*node)).collect();
         raster.facets(&nodes, triangles, LINK);
     }
-    let is_shaped = |link: usize| shapes.iter().any(|(joint, _)| *joint == Some(link));
-    for (link, &from) in pose.origins.iter().enumerate().filter(|(link, _)| !is_shaped(*link)) {
-        let own = || chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| node.link == link).map(|(_, &x)| x);
-        let to = match pose.origins.get(link + 1) {
-            Some(&next) => next,
-            None => own().max_by(|a, b| a.distance(from).total_cmp(&b.distance(from))).unwrap_or(from),
-        };
-        raster.capsule([from, to], thickness, LINK);
-        raster.sphere(from, 2.0 * thickness, LINK);
-    }
-    for (node, &x) in chain.nodes.iter().zip(&pose.nodes).filter(|(node, _)| !is_shaped(node.link)) {
-        raster.sphere(x, node.radius.max(1.25 * thickness), PROXY_NODE);
-    }
+    let is_plain = |link: usize| !shapes.iter().any(|(joint, _)| *joint == Some(link));
+    raster.cones(&solid::links(chain, pose, is_plain, thickness, LINK));
+    raster.cones(&solid::nodes(chain, pose, is_plain, thickness, PROXY_NODE));
 }
 
 /// From the side of the arm and a little from where it pushes, above: the dent is seen in profile.

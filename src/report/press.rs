@@ -1,13 +1,13 @@
 //! The press as time curves (paper's Fig. 5): contact torque, configuration, number of contacting nodes, and the
 //! energy accounts of proxy and coupling.
 
-use super::{
-    canvas::Canvas,
-    chart::{Curve, Lane, Stack},
-    colour,
-};
 use crate::{
     JointVector,
+    draw::{
+        canvas::Canvas,
+        chart::{Curve, Lane, Stack},
+        colour,
+    },
     render::{
         accounts::Accounts,
         trace::{Tick, Trace},

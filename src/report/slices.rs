@@ -4,15 +4,18 @@
 //! the other joints stay at that plane's values. The boundary is the zero line of the gap, or, where no gap is stored,
 //! the line on which the contact index, interpolated, is one half (section 3.1).
 
-use super::{
-    canvas::{Anchor, Area, Canvas},
-    chart::{self, Curve, Lane, Stack},
-    colour::{self, ColourMap},
-    plot::{self, Entry, Mark, Panel, Scale},
-    press::subscript,
-    ticks,
+use super::press::subscript;
+use crate::{
+    contact::Status,
+    dataset::Dataset,
+    draw::{
+        canvas::{Anchor, Area, Canvas},
+        chart::{self, Curve, Lane, Stack},
+        colour::{self, ColourMap},
+        plot::{self, Entry, Mark, Panel, Scale},
+        ticks,
+    },
 };
-use crate::{contact::Status, dataset::Dataset};
 use std::collections::BTreeMap;
 
 /// Most cells drawn along a side: finer than the eye sees, and a bound on the file's size.

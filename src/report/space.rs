@@ -7,16 +7,22 @@
 //! grows, so that the deep configurations are not hidden behind the boundary.
 
 use super::{
-    canvas::{Anchor, Area, Canvas},
-    chart,
-    colour::{self, ColourMap},
-    plot::{self, Entry, Mark},
     press::subscript,
-    raster::{Camera, Raster},
     slices::{is_mixed, torque_size},
-    ticks,
 };
-use crate::{contact::Status, dataset::Dataset, report::PIXELS};
+use crate::{
+    contact::Status,
+    dataset::Dataset,
+    draw::{
+        canvas::{Anchor, Area, Canvas},
+        chart,
+        colour::{self, ColourMap},
+        plot::{self, Entry, Mark},
+        raster::{Camera, Raster},
+        ticks,
+    },
+    report::PIXELS,
+};
 use glam::DVec3;
 use std::collections::HashMap;
 

@@ -55,7 +55,6 @@ pub use lowest::Lowered;
 pub use measured::MOST_CONFIGURATIONS;
 pub use merge::{Merge, MergeError, Merged};
 pub use node::{NoEnergy, check_algorithm};
-pub(crate) use pilot::FARTHEST_EXTRAPOLATION;
 pub use pilot::{Aim, Choice, Cost, Pilot, PilotError, Prospect, Trial};
 pub use plan::{Plan, ShardCost};
 pub use reach::{DepthShare, JointReach, Reach, ReachError};

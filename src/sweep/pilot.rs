@@ -27,7 +27,7 @@ use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
 
 /// How much finer than the finest measured grid the measured order is trusted (1): two octaves, as many as it was
 /// measured over. What takes more is not offered.
-pub const FARTHEST_EXTRAPOLATION: f64 = 4.0;
+const FARTHEST_EXTRAPOLATION: f64 = 4.0;
 
 /// Share of an error to stay below that the grid's spacing may have, as the measured order predicts it (1); what the
 /// solver adds is independent of it and adds as squares, so that 0.6 is left for the solver and for the error of the

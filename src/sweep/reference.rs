@@ -120,12 +120,6 @@ impl Reference {
         }
     }
 
-    /// The first `count` configurations.
-    pub fn first(&self, count: usize) -> Self {
-        let (places, exact) = (self.places[..count].to_vec(), self.exact[..count].to_vec());
-        Self { places, exact, energies: self.energies[..count].to_vec(), ..*self }
-    }
-
     /// The same configurations with other torques.
     pub fn with(&self, exact: Vec<JointVector>) -> Self {
         Self { places: self.places.clone(), exact, energies: self.energies.clone(), ..*self }

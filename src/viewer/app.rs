@@ -176,30 +176,27 @@ impl Viewer {
         }
     }
 
-    /// Waits until what is being opened is open, drawn as it is to be, and priced; for pictures and tests.
-    pub fn wait(&mut self, egui: &egui::Context) {
+    /// Waits until what is being opened is open, and drawn as it is to be; for pictures and tests.
+    pub fn wait(&mut self) {
         if let Some(job) = self.job.take() {
-            self.take(job.wait(), egui);
+            self.take(job.wait());
         }
         if let Some(session) = &mut self.session {
             let redrawn = self.scene.wait(&session.loaded, &session.controls.tuning.graphics).map_err(not_drawn);
             self.error = redrawn.and_then(|()| session.wait()).err().or(self.error.take());
-            session.controls.wait();
         }
     }
 
-    fn take(&mut self, outcome: JobResult, egui: &egui::Context) {
+    fn take(&mut self, outcome: JobResult) {
         match outcome {
             JobResult::Cancelled => {}
             JobResult::Failed(reason) => self.error = Some(reason),
             JobResult::Loaded(loaded) => {
                 let (loaded, body) = *loaded;
-                let wake = egui.clone();
-                let wake = move || wake.request_repaint();
                 // Two sessions cannot hold one device: the one before ends first.
                 let ended = self.session.take_if(|session| session.lead.is_some()).map(|session| session.controls);
                 let device = self.device.as_ref();
-                match Session::new(loaded, &self.context, self.pace, device, wake) {
+                match Session::new(loaded, self.pace, device) {
                     Ok(mut session) => {
                         self.scene.open(&session.loaded, body);
                         if let Some(before) = ended.as_ref().or(self.session.as_ref().map(|before| &before.controls)) {
@@ -303,7 +300,7 @@ impl Viewer {
         }
         if let Some(outcome) = self.job.as_mut().and_then(Job::poll) {
             self.job = None;
-            self.take(outcome, egui);
+            self.take(outcome);
         }
         let Some(session) = &mut self.session else { return };
         let wake = || {

@@ -17,7 +17,8 @@ use std::sync::Arc;
 
 /// The object as it is drawn.
 pub struct Body {
-    nodes: Nodes,
+    /// The state of its nodes on the device.
+    update: FrameUpdate,
     /// Buffers from which the surface is drawn.
     pub surface: Surface,
     /// n0 (m).
@@ -25,12 +26,6 @@ pub struct Body {
     /// Largest displacement at rest (m) and contact force on a node (N) of the motions that can be played; of the whole
     /// dataset where these touch nothing.
     pub extremes: [f64; 2],
-}
-
-/// The object's nodes on the device, and what moves them.
-pub struct Nodes {
-    /// Their state.
-    pub update: FrameUpdate,
     contact: Arc<ContactForces>,
     forces: Vec<DVec3>,
     smoothing: Option<Smoothing>,
@@ -41,33 +36,33 @@ pub struct Nodes {
 }
 
 /// Frames of the object that one frame of the window makes up for: a window at 10 frames a second still shows an object
-/// at
-/// 60. A slower one shows it slowed down.
+/// at 60. A slower one shows it slowed down.
 const MOST_FRAMES: usize = 6;
 
-impl Nodes {
-    /// Those of `loaded` at rest, to be moved with `effects`; none where it has no object.
+impl Body {
+    /// The object of `loaded` at rest, to be moved with `effects`; none where it has no object.
     ///
     /// # Errors
-    /// When the device refuses them.
+    /// When the device refuses it.
     pub fn new(context: &Arc<Context>, loaded: &Loaded, effects: &GraphicsEffects) -> Result<Option<Self>, FrameError> {
         let (Some(object), Some(contact), Some(graphics)) =
             (&loaded.setup.object, &loaded.forces, &loaded.setup.scene.graphics)
         else {
             return Ok(None);
         };
-        let nodes = object.rest.len();
-        let period = 1.0 / graphics.rate;
+        let (nodes, period) = (object.rest.len(), 1.0 / graphics.rate);
         let update = FrameUpdate::new(Arc::clone(context), object, period, FrameMethod::suitable(object), effects)?;
-        let forces = vec![DVec3::ZERO; nodes];
-        let smoothing = effects.smoothing.map(|time| Smoothing::new(time, period, nodes));
-        Ok(Some(Self { update, contact: Arc::clone(contact), forces, smoothing, period, owed: 0.0 }))
-    }
-
-    /// Time between two frames (s).
-    #[must_use]
-    pub fn period(&self) -> f64 {
-        self.period
+        Ok(Some(Self {
+            surface: Surface::new(context, object, &update)?,
+            update,
+            rest: object.rest.iter().map(|point| point.as_vec3()).collect(),
+            extremes: extremes(loaded),
+            contact: Arc::clone(contact),
+            forces: vec![DVec3::ZERO; nodes],
+            smoothing: effects.smoothing.map(|time| Smoothing::new(time, period, nodes)),
+            period,
+            owed: 0.0,
+        }))
     }
 
     /// Lets `elapsed` (s) go by under the contact forces of `latest`.
@@ -88,29 +83,6 @@ impl Nodes {
         }
         Ok(())
     }
-}
-
-impl Body {
-    /// The object of `loaded` at rest, to be moved with `effects`; none where it has no object.
-    ///
-    /// # Errors
-    /// When the device refuses it.
-    pub fn new(context: &Arc<Context>, loaded: &Loaded, effects: &GraphicsEffects) -> Result<Option<Self>, FrameError> {
-        let (Some(object), Some(nodes)) = (&loaded.setup.object, Nodes::new(context, loaded, effects)?) else {
-            return Ok(None);
-        };
-        let surface = Surface::new(context, object, &nodes.update)?;
-        let rest = object.rest.iter().map(|point| point.as_vec3()).collect();
-        Ok(Some(Self { nodes, surface, rest, extremes: extremes(loaded) }))
-    }
-
-    /// Lets `elapsed` (s) go by under the contact forces of `latest`.
-    ///
-    /// # Errors
-    /// When the device fails.
-    pub fn advance(&mut self, latest: &Latest, elapsed: f64) -> Result<(), GpuError> {
-        self.nodes.advance(latest, elapsed)
-    }
 
     /// Place of `node` at rest (m).
     #[must_use]
@@ -120,7 +92,7 @@ impl Body {
 
     /// Nodes with a contact force, and that force (N).
     pub fn contacts(&self) -> impl Iterator<Item = (usize, DVec3)> {
-        self.nodes.forces.iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
+        self.forces.iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
     }
 }
 

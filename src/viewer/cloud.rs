@@ -13,10 +13,8 @@ use crate::{
     JointVector,
     contact::Status,
     dataset::Dataset,
-    report::{
-        colour::ColourMap,
-        slices::{torque_size, torque_size_label},
-    },
+    draw::colour::ColourMap,
+    report::slices::{torque_size, torque_size_label},
 };
 use eframe::egui::{self, Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
 use glam::{Vec2, Vec3};
@@ -143,7 +141,7 @@ impl Cloud {
             painter.text(at, Align2::LEFT_TOP, note, theme::small(), ui.visuals().weak_text_color());
         }
         let bar = Rect::from_min_size(rect.right_top() + BAR_AT, vec2(BAR_WIDTH, COLOUR_BAR));
-        gradient(&painter, bar, map, true);
+        gradient(&painter, bar, map);
         let (text, small) = (ui.visuals().text_color(), theme::small());
         let title = torque_size_label(dataset);
         painter.text(bar.center_top() + vec2(0.0, -FINE_GAP), Align2::CENTER_BOTTOM, title, small.clone(), text);

@@ -4,7 +4,7 @@ use super::palette::Palette;
 use crate::{
     contact::Status,
     dataset::{Dataset, Grid},
-    report::colour::ColourMap,
+    draw::colour::ColourMap,
 };
 use eframe::egui::Color32;
 

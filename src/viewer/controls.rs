@@ -1,4 +1,4 @@
-//! Settings that can be turned while one feels: gains, interpolation, effects with their prices, what is shown, and how
+//! Settings that can be turned while one feels: gains, interpolation, effects, what is shown, and how
 //! the scene is baked.
 
 use super::{
@@ -6,15 +6,13 @@ use super::{
     job::Solver,
     loaded::Loaded,
     palette,
-    prices::{Item, Prices},
     scene::Shown,
     theme::{CHOICE_WIDTH, GROUP_GAP},
     view_renderer::Quantity,
 };
 use crate::{
     dataset::Dataset,
-    gpu::Context,
-    scene::{Algorithm, EFFECTS, Interpolation, Scene, Tuning},
+    scene::{Algorithm, EFFECTS, Effect, Interpolation, Scene, Tuning},
 };
 use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
 use std::sync::Arc;
@@ -33,7 +31,6 @@ pub struct Controls {
     pub solver: Solver,
     /// Whether a change of the scene is baked at once.
     bake_on_change: bool,
-    prices: Prices,
 }
 
 /// Greatest stiffness of contact that can be typed (N/m), and the change for each point of the pointer's way
@@ -42,24 +39,17 @@ const CONTACT_STIFFNESS: std::ops::RangeInclusive<f64> = 1.0..=1e6;
 const CONTACT_STIFFNESS_DRAG: f64 = 5.0;
 
 impl Controls {
-    /// As `loaded` has them. Everything is priced in the background, frames on the device of `context`; `wake` is
-    /// called whenever there is news.
+    /// As `loaded` has them.
     #[must_use]
-    pub fn new(loaded: &Loaded, context: &Arc<Context>, wake: impl Fn() + Send + 'static) -> Self {
+    pub fn new(loaded: &Loaded) -> Self {
         let original = loaded.tuning();
-        let prices = Prices::measure(loaded, context, wake);
         let (tuning, scene) = (original.clone(), loaded.scene.clone());
-        Self { tuning, original, joint: None, scene, solver: Solver::Auto, bake_on_change: false, prices }
+        Self { tuning, original, joint: None, scene, solver: Solver::Auto, bake_on_change: false }
     }
 
     /// Keeps of `before` what a new bake of the same scene does not change.
     pub fn keep(&mut self, before: &Self) {
         (self.solver, self.bake_on_change) = (before.solver.clone(), before.bake_on_change);
-    }
-
-    /// Waits until everything is priced; for pictures and tests.
-    pub fn wait(&mut self) {
-        self.prices.wait();
     }
 
     /// Shows the panel, and returns whether the scene is to be baked again. `advice`: what is wrong with the gains, if
@@ -114,7 +104,7 @@ impl Controls {
         };
     }
 
-    /// Shows how the torque is interpolated between grid points, and what a tick costs with each way.
+    /// Shows how the torque is interpolated between grid points.
     fn interpolation(&mut self, ui: &mut Ui, dataset: &Dataset) {
         ui.horizontal(|ui| {
             let label = ui.label("Interpolation").on_hover_text("How the torque follows from the grid points around");
@@ -136,43 +126,27 @@ impl Controls {
                 .response
                 .labelled_by(label.id);
         });
-        let chosen = self.tuning.haptics.interpolation;
-        let mut cost = |interpolation: Interpolation| {
-            let cost = self.prices.of(Item::Tick(interpolation)).cost()?;
-            Some(format!("{} {cost}", interpolation.name()))
-        };
-        let own = cost(chosen).unwrap_or_else(|| format!("{} ?", chosen.name()));
-        let others = Interpolation::ALL.into_iter().filter(|other| *other != chosen).filter_map(cost);
-        note(ui, format!("{own} µs a tick\n{}", others.collect::<Vec<_>>().join(", ")));
     }
 
-    /// A box for every effect that the scene names, with its price.
+    /// A box for every effect that the scene names.
     fn effects(&mut self, ui: &mut Ui) {
         ui.add_space(GROUP_GAP);
-        ui.heading("Effects").on_hover_text("What the scene adds to plain contact, each with its price");
-        let named: Vec<usize> = (0..EFFECTS.len()).filter(|&number| EFFECTS[number].is_in(&self.original)).collect();
+        ui.heading("Effects").on_hover_text("What the scene adds to plain contact");
+        let named: Vec<Effect> = EFFECTS.into_iter().filter(|effect| effect.is_in(&self.original)).collect();
         if named.is_empty() {
             let there_are: Vec<String> =
                 EFFECTS.iter().map(|effect| format!("{}: {} in [{}]", effect.name, effect.key, effect.table)).collect();
             let why = RichText::new("This scene names none.").weak().small();
             ui.label(why).on_hover_text(format!("There are:\n{}", there_are.join("\n")));
         }
-        for number in named {
-            let effect = &EFFECTS[number];
-            let price = self.prices.of(Item::Effect(number));
+        for effect in named {
             let mut on = effect.is_in(&self.tuning);
-            ui.horizontal(|ui| {
-                let changed = ui.checkbox(&mut on, effect.name).on_hover_text(effect.what).changed();
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    note(ui, price.told(if effect.is_drawn() { "frame" } else { "tick" }))
-                        .on_hover_text(price.meaning());
-                });
-                if changed && on {
-                    effect.take_back(&mut self.tuning, &self.original);
-                } else if changed {
-                    effect.leave_out(&mut self.tuning);
-                }
-            });
+            let changed = ui.checkbox(&mut on, effect.name).on_hover_text(effect.what).changed();
+            if changed && on {
+                effect.take_back(&mut self.tuning, &self.original);
+            } else if changed {
+                effect.leave_out(&mut self.tuning);
+            }
         }
     }
 

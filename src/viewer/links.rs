@@ -1,7 +1,7 @@
 //! Shapes of links as the device draws them.
 
-use super::shapes::Colour;
 use crate::{
+    draw::colour::Colour,
     gpu::{Context, GpuError},
     proxy::{Pose, shape_frame, shape_triangles},
     scene::LinkShape,

@@ -14,7 +14,6 @@
 //! | `view_renderer`, `pipelines`, `shapes`, `links`, `pixels` | the renderer of that panel |
 //! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
 //! | `legend`, `steps` | a sample and its name, the first screen |
-//! | `prices` | what effects and interpolations cost |
 //!
 //! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
 //! haptic thread waits for nothing here; see `feel`.
@@ -44,7 +43,6 @@ mod panels;
 mod pipelines;
 mod pixels;
 mod plots;
-mod prices;
 mod scene;
 mod session;
 mod shapes;

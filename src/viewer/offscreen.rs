@@ -4,8 +4,8 @@
 use super::{Start, TickSource, ViewError, Viewer, dress, pixels, theme};
 use crate::{
     dataset::replace_file,
+    draw::canvas::encode_png,
     gpu::{AdapterChoice, Context, GpuError},
-    report::canvas::encode_png,
 };
 use eframe::{
     egui::{self, Pos2, Rect, Theme, vec2},
@@ -75,7 +75,7 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
     dress(&egui);
     let mut viewer = Viewer::new(Arc::clone(&context), render.clone(), TickSource::Steps, PathBuf::from("."))?;
     viewer.start(start, &egui);
-    viewer.wait(&egui);
+    viewer.wait();
     if let Some(error) = viewer.error() {
         return Err(ViewError::Open(error.to_owned()));
     }

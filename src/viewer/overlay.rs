@@ -10,7 +10,7 @@ use super::{
     trimmed,
     view_renderer::Quantity,
 };
-use crate::report::colour::ColourMap;
+use crate::draw::colour::ColourMap;
 use eframe::egui::{Align2, Painter, Rect, Stroke, Ui, Vec2, vec2};
 use glam::Vec3;
 
@@ -89,7 +89,7 @@ fn colours(ui: &Ui, painter: &Painter, rect: Rect, body: &Body, quantity: Quanti
     };
     let (small, text) = (theme::small(), ui.visuals().text_color());
     let bar = bar(rect);
-    gradient(painter, bar, ColourMap::Pale { low: 0.0, high: 1.0 }, false);
+    gradient(painter, bar, ColourMap::Pale { low: 0.0, high: 1.0 });
     painter.text(bar.center_top() - vec2(0.0, FINE_GAP), Align2::CENTER_BOTTOM, title, small.clone(), text);
     painter.text(bar.left_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, "0", small.clone(), text);
     painter.text(bar.right_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, number(top), small, text);

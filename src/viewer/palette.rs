@@ -1,7 +1,7 @@
 //! Colours of the window, light and dark: the palette of the figures (`report/colour.rs`), few accents.
 
 use super::theme::{HAIRLINE, ROUNDING, SHADOW_BLUR, SHADOW_DROP};
-use crate::report::colour::{self, Colour};
+use crate::draw::colour::Colour;
 use eframe::egui::{self, Color32, CornerRadius, Shadow, Stroke, Theme, Visuals, style::HandleShape};
 
 /// Strength of lines that only help to read others, over their colour's own (1).
@@ -43,6 +43,12 @@ pub fn egui_colour(colour: Colour) -> Color32 {
     Color32::from_rgb(red, green, blue).gamma_multiply(colour.opacity)
 }
 
+/// A figure's colour of egui's.
+#[must_use]
+pub fn figure_colour(colour: Color32) -> Colour {
+    Colour { rgb: [colour.r(), colour.g(), colour.b()], opacity: 1.0 }
+}
+
 /// Colour of series `number` in a plot: Okabe and Ito's, on dark ground the blue in its lighter shade, on light ground
 /// the light ones in a darker shade, since a line is thin. The fifth is a grey instead of their second blue.
 #[must_use]
@@ -53,40 +59,28 @@ pub fn series(number: usize, dark: bool) -> Color32 {
     egui_colour(Colour::hex(colours[number % colours.len()]))
 }
 
+/// A colour on light ground, or the one that takes its place on dark ground.
+fn chosen(is_dark: bool, light: u32, dark: u32) -> Color32 {
+    egui_colour(Colour::hex(if is_dark { dark } else { light }))
+}
+
 /// The palette that goes with `visuals`.
 #[must_use]
 pub fn of(visuals: &Visuals) -> Palette {
-    let hex = |number| egui_colour(Colour::hex(number));
-    if visuals.dark_mode {
-        Palette {
-            stage: hex(0x16_1a_20),
-            link: hex(0x8f_99_a8),
-            node: hex(0xd5_dc_e6),
-            force: hex(0xf0_8a_3c),
-            ghost: hex(0x56_b4_e9),
-            axis: hex(0x8a_94_a3),
-            here: hex(0xff_ff_ff),
-            flagged: hex(0xf6_5a_83),
-            free: hex(0x24_2a_33),
-            absent: hex(0x10_13_17),
-            good: hex(0x3d_b8_8f),
-            bad: hex(0xf0_8a_3c),
-        }
-    } else {
-        Palette {
-            stage: hex(0xf6_f7_f9),
-            link: hex(0x8d_97_a5),
-            node: hex(0x2b_34_40),
-            force: hex(0xd5_5e_00),
-            ghost: hex(0x00_72_b2),
-            axis: hex(0x6b_75_82),
-            here: hex(0x22_2b_36),
-            flagged: hex(0xd0_1c_55),
-            free: hex(0xc8_d0_d9),
-            absent: hex(0x8f_99_a5),
-            good: hex(0x00_80_5c),
-            bad: hex(0xc2_52_00),
-        }
+    let hex = |light, dark| chosen(visuals.dark_mode, light, dark);
+    Palette {
+        stage: hex(0xf6_f7_f9, 0x16_1a_20),
+        link: hex(0x8d_97_a5, 0x8f_99_a8),
+        node: hex(0x2b_34_40, 0xd5_dc_e6),
+        force: hex(0xd5_5e_00, 0xf0_8a_3c),
+        ghost: hex(0x00_72_b2, 0x56_b4_e9),
+        axis: hex(0x6b_75_82, 0x8a_94_a3),
+        here: hex(0x22_2b_36, 0xff_ff_ff),
+        flagged: hex(0xd0_1c_55, 0xf6_5a_83),
+        free: hex(0xc8_d0_d9, 0x24_2a_33),
+        absent: hex(0x8f_99_a5, 0x10_13_17),
+        good: hex(0x00_80_5c, 0x3d_b8_8f),
+        bad: hex(0xc2_52_00, 0xf0_8a_3c),
     }
 }
 
@@ -106,76 +100,27 @@ pub fn ring(palette: &Palette, outside: bool) -> [(f32, Color32); 3] {
 
 /// Gives `ctx` both sets of colours.
 pub fn apply(ctx: &egui::Context) {
-    ctx.set_visuals_of(Theme::Light, light());
-    ctx.set_visuals_of(Theme::Dark, dark());
+    ctx.set_visuals_of(Theme::Light, visuals(false));
+    ctx.set_visuals_of(Theme::Dark, visuals(true));
 }
 
-/// egui's own colours on light ground.
-fn light() -> Visuals {
-    let ink = egui_colour(colour::INK);
-    let mut visuals = Visuals::light();
-    dress(&mut visuals, ink, egui_colour(colour::SOFT_INK), Color32::WHITE, Color32::from_rgb(0xfa, 0xfb, 0xfc));
-    let line = egui_colour(Colour::hex(0xd6_dc_e3));
-    visuals.widgets.noninteractive.bg_stroke = Stroke::new(HAIRLINE, line);
-    visuals.window_stroke = Stroke::new(HAIRLINE, line);
-    for (widget, fill) in [
-        (&mut visuals.widgets.inactive, 0xec_ef_f3),
-        (&mut visuals.widgets.hovered, 0xe0_e5_eb),
-        (&mut visuals.widgets.active, 0xcf_d7_e0),
-        (&mut visuals.widgets.open, 0xe6_ea_ef),
-    ] {
-        widget.weak_bg_fill = egui_colour(Colour::hex(fill));
-        widget.bg_fill = widget.weak_bg_fill;
-        widget.bg_stroke = Stroke::NONE;
-        widget.fg_stroke.color = ink;
-    }
-    visuals.selection.bg_fill = egui_colour(Colour::hex(0xcf_e3_f2));
-    visuals.selection.stroke = Stroke::new(HAIRLINE, egui_colour(Colour::hex(0x00_4c_78)));
-    visuals.error_fg_color = egui_colour(Colour::hex(0xb0_1e_3c));
-    visuals.warn_fg_color = egui_colour(Colour::hex(0xa8_48_00));
-    visuals.hyperlink_color = egui_colour(colour::series(0));
-    visuals.faint_bg_color = egui_colour(Colour::hex(0xf1_f3_f6));
-    visuals
-}
-
-/// egui's own colours on dark ground.
-fn dark() -> Visuals {
-    let ink = egui_colour(Colour::hex(0xe3_e7_ed));
-    let mut visuals = Visuals::dark();
-    let (ground, panel) = (Color32::from_rgb(0x14, 0x17, 0x1c), Color32::from_rgb(0x1d, 0x21, 0x28));
-    dress(&mut visuals, ink, egui_colour(Colour::hex(0xa7_b0_bd)), ground, panel);
-    let line = egui_colour(Colour::hex(0x36_3d_48));
-    visuals.widgets.noninteractive.bg_stroke = Stroke::new(HAIRLINE, line);
-    visuals.window_stroke = Stroke::new(HAIRLINE, line);
-    for (widget, fill) in [
-        (&mut visuals.widgets.inactive, 0x2c_33_3d),
-        (&mut visuals.widgets.hovered, 0x38_41_4d),
-        (&mut visuals.widgets.active, 0x46_51_60),
-        (&mut visuals.widgets.open, 0x31_38_43),
-    ] {
-        widget.weak_bg_fill = egui_colour(Colour::hex(fill));
-        widget.bg_fill = widget.weak_bg_fill;
-        widget.bg_stroke = Stroke::NONE;
-        widget.fg_stroke.color = ink;
-    }
-    visuals.selection.bg_fill = egui_colour(Colour::hex(0x1d_4a_68));
-    visuals.selection.stroke = Stroke::new(HAIRLINE, egui_colour(Colour::hex(0xc5_e4_f8)));
-    visuals.error_fg_color = egui_colour(Colour::hex(0xff_7d_94));
-    visuals.warn_fg_color = egui_colour(Colour::hex(0xf5_a3_5c));
-    visuals.hyperlink_color = egui_colour(Colour::hex(0x56_b4_e9));
-    visuals.faint_bg_color = egui_colour(Colour::hex(0x22_27_2f));
-    visuals
-}
-
-/// Sets what both themes have in common: text in `ink`, notes in `soft`, fields on `ground`, panels on `panel`.
-fn dress(visuals: &mut Visuals, ink: Color32, soft: Color32, ground: Color32, panel: Color32) {
-    visuals.widgets.noninteractive.fg_stroke.color = ink;
-    visuals.weak_text_color = Some(soft);
-    visuals.extreme_bg_color = ground;
+/// egui's own colours, on light ground or on dark.
+fn visuals(dark: bool) -> Visuals {
+    let hex = |on_light, on_dark| chosen(dark, on_light, on_dark);
+    let mut visuals = if dark { Visuals::dark() } else { Visuals::light() };
+    let (ink, panel) = (hex(0x22_2b_36, 0xe3_e7_ed), hex(0xfa_fb_fc, 0x1d_21_28));
+    visuals.weak_text_color = Some(hex(0x55_60_6e, 0xa7_b0_bd));
+    visuals.extreme_bg_color = hex(0xff_ff_ff, 0x14_17_1c);
     visuals.panel_fill = panel;
     visuals.window_fill = panel;
-    visuals.widgets.noninteractive.bg_fill = panel;
-    visuals.widgets.noninteractive.weak_bg_fill = panel;
+    let line = Stroke::new(HAIRLINE, hex(0xd6_dc_e3, 0x36_3d_48));
+    visuals.window_stroke = line;
+    visuals.selection.bg_fill = hex(0xcf_e3_f2, 0x1d_4a_68);
+    visuals.selection.stroke = Stroke::new(HAIRLINE, hex(0x00_4c_78, 0xc5_e4_f8));
+    visuals.error_fg_color = hex(0xb0_1e_3c, 0xff_7d_94);
+    visuals.warn_fg_color = hex(0xa8_48_00, 0xf5_a3_5c);
+    visuals.hyperlink_color = hex(0x00_72_b2, 0x56_b4_e9);
+    visuals.faint_bg_color = hex(0xf1_f3_f6, 0x22_27_2f);
     visuals.slider_trailing_fill = true;
     visuals.handle_shape = HandleShape::Circle;
     visuals.indent_has_left_vline = false;
@@ -183,20 +128,23 @@ fn dress(visuals: &mut Visuals, ink: Color32, soft: Color32, ground: Color32, pa
         offset: [0, SHADOW_DROP],
         blur: SHADOW_BLUR,
         spread: 0,
-        color: Color32::from_black_alpha(if visuals.dark_mode { 120 } else { 40 }),
+        color: Color32::from_black_alpha(if dark { 120 } else { 40 }),
     };
     visuals.popup_shadow = visuals.window_shadow;
     let widgets = &mut visuals.widgets;
-    for widget in [
-        &mut widgets.noninteractive,
-        &mut widgets.inactive,
-        &mut widgets.hovered,
-        &mut widgets.active,
-        &mut widgets.open,
+    for (widget, fill, stroke) in [
+        (&mut widgets.noninteractive, panel, line),
+        (&mut widgets.inactive, hex(0xec_ef_f3, 0x2c_33_3d), Stroke::NONE),
+        (&mut widgets.hovered, hex(0xe0_e5_eb, 0x38_41_4d), Stroke::NONE),
+        (&mut widgets.active, hex(0xcf_d7_e0, 0x46_51_60), Stroke::NONE),
+        (&mut widgets.open, hex(0xe6_ea_ef, 0x31_38_43), Stroke::NONE),
     ] {
+        (widget.weak_bg_fill, widget.bg_fill, widget.bg_stroke) = (fill, fill, stroke);
+        widget.fg_stroke.color = ink;
         widget.corner_radius = CornerRadius::same(ROUNDING);
         widget.expansion = 0.0;
     }
+    visuals
 }
 
 #[cfg(test)]
@@ -238,7 +186,7 @@ mod tests {
     fn text_and_marks_stand_out_from_their_ground() {
         assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 1e-4);
         assert!((contrast(Color32::from_rgb(0x76, 0x76, 0x76), Color32::WHITE) - 4.54).abs() < 0.01);
-        for visuals in [light(), dark()] {
+        for visuals in [visuals(false), visuals(true)] {
             let palette = of(&visuals);
             let texts = [
                 visuals.text_color(),

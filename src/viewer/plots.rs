@@ -12,11 +12,12 @@ use super::{
 use crate::{
     JointVector,
     dataset::replace_file,
+    draw::canvas::Canvas,
     render::{
         timing::{Durations, Percentiles},
         trace::Tick,
     },
-    report::{self, ReportError, canvas::Canvas},
+    report::{self, ReportError},
 };
 use eframe::egui::{self, Button, RichText, Ui, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};

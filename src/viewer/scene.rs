@@ -9,14 +9,15 @@ use super::{
     links::Links,
     loaded::Loaded,
     overlay,
-    palette::{self, Palette},
+    palette::{self, Palette, figure_colour},
     shapes::Shape,
     steering::Steering,
     view_renderer::{Look, Quantity, ViewRenderer},
 };
 use crate::{
+    draw::solid::{self, Cone},
     gpu::{Context, FrameError},
-    proxy::Pose,
+    proxy::{Chain, Pose},
     render::session::Latest,
     scene::GraphicsEffects,
 };
@@ -52,8 +53,6 @@ pub struct SceneView {
     links: Option<Links>,
     /// The object with the effects that the controls have, set up in the background.
     redrawing: Following<GraphicsEffects, Result<Option<Body>, FrameError>>,
-    /// Link of each contact node.
-    node_links: Vec<usize>,
     pose: Pose,
     ghost: Pose,
     /// The parts that are shown.
@@ -63,16 +62,14 @@ pub struct SceneView {
 }
 
 // Sizes of the proxy: a link's radius over the extent of the scene; all others over that radius [1].
-const LINK: f32 = 0.012;
-const JOINT_BALL: f32 = 1.7;
-const NODE_BALL: f32 = 1.35;
-const CONTACT_BALL: f32 = 1.3;
-const HELD_BALL: f32 = 2.0;
-const GHOST: f32 = 0.45;
-const ARROW: f32 = 0.55;
+const LINK: f64 = 0.012;
+const CONTACT_BALL: f64 = 1.3;
+const HELD_BALL: f64 = 2.0;
+const GHOST: f64 = 0.45;
+const ARROW: f64 = 0.55;
 
 /// Length of the arrow of the dataset's greatest force over the extent of the scene (1).
-const LONGEST_ARROW: f32 = 0.5;
+const LONGEST_ARROW: f64 = 0.5;
 
 /// Radius of what is seen at first over the extent of the scene (1): a little less than all, whose corners are empty.
 const SEEN: f32 = 0.98;
@@ -95,7 +92,6 @@ impl SceneView {
             body: None,
             links: None,
             redrawing: Following::new(None),
-            node_links: Vec::new(),
             pose: Pose::default(),
             ghost: Pose::default(),
             shown: Shown { edges: true, forces: true, ghost: true, quantity: Quantity::Displacement },
@@ -116,7 +112,6 @@ impl SceneView {
         chain.pose(&loaded.start(), &mut self.pose);
         // Without memory for them on the device, the arm is drawn from joint to joint.
         self.links = Links::new(&self.context, &loaded.setup.scene.shapes, chain.joints.len()).unwrap_or_default();
-        self.node_links = chain.nodes.iter().map(|node| node.link).collect();
         let object = loaded.setup.object.iter().flat_map(|object| &object.rest);
         let points: Vec<Vec3> =
             object.chain(&self.pose.nodes).chain(&self.pose.origins).map(|point| point.as_vec3()).collect();
@@ -198,7 +193,7 @@ impl SceneView {
         self.steering.steer(ui, &response, rect, &loaded.setup.chain, &self.pose, &mut guide);
         drop(guide);
         let palette = palette::of(ui.visuals());
-        let texture = self.draw(rect, ui.ctx().pixels_per_point(), &palette)?;
+        let texture = self.draw(rect, ui.ctx().pixels_per_point(), &palette, &loaded.setup.chain)?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(texture, rect, whole, Color32::WHITE);
         let Shown { quantity, forces, .. } = self.shown;
@@ -211,7 +206,13 @@ impl SceneView {
         self.steering.reset();
     }
 
-    fn draw(&mut self, rect: Rect, pixels_per_point: f32, palette: &Palette) -> Result<egui::TextureId, ViewError> {
+    fn draw(
+        &mut self,
+        rect: Rect,
+        pixels_per_point: f32,
+        palette: &Palette,
+        chain: &Chain,
+    ) -> Result<egui::TextureId, ViewError> {
         let size = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
         let extremes = self.body.as_ref().map_or([0.0; 2], |body| body.extremes);
         let top = match self.shown.quantity {
@@ -219,14 +220,14 @@ impl SceneView {
             Quantity::Force => extremes[1],
         };
         let look = Look {
-            background: channels(palette.stage),
+            background: figure_colour(palette.stage).channels(),
             quantity: self.shown.quantity,
             colour_top: top as f32,
             edge_width: if self.shown.edges { pixels_per_point } else { 0.0 },
         };
-        let shapes = self.shapes(palette);
+        let shapes = self.shapes(palette, chain);
         let surface = self.body.as_ref().map(|body| &body.surface);
-        let links = self.links.as_ref().map(|links| links.at(&self.pose, channels(palette.link)));
+        let links = self.links.as_ref().map(|links| links.at(&self.pose, figure_colour(palette.link)));
         let picture = self.stage.draw(size, &self.steering.camera, &look, surface, links.as_ref(), &shapes)?;
         let actual = [picture.width() as usize, picture.height() as usize];
         let texture = match self.texture {
@@ -250,76 +251,33 @@ impl SceneView {
     }
 
     /// Everything that is drawn besides the surface.
-    fn shapes(&self, palette: &Palette) -> Vec<Shape> {
-        let unit = LINK * self.extent;
+    fn shapes(&self, palette: &Palette, chain: &Chain) -> Vec<Shape> {
+        let (extent, unit) = (f64::from(self.extent), LINK * f64::from(self.extent));
         let plain = |link: usize| !self.links.as_ref().is_some_and(|links| links.is_shaped(link));
-        let mut shapes = rods(&self.pose, plain, unit, channels(palette.link));
-        shapes.extend(nodes(&self.pose, &self.node_links, plain, unit, channels(palette.node)));
-        if self.shown.ghost && self.ghost.nodes != self.pose.nodes {
-            let (unit, ghost) = (GHOST * unit, channels(palette.ghost));
-            let mut bare = rods(&self.ghost, |_| true, unit, ghost);
-            bare.extend(nodes(&self.ghost, &self.node_links, plain, unit, ghost));
-            shapes.extend(bare.into_iter().map(Shape::unlit));
-        }
+        let mut cones = solid::links(chain, &self.pose, plain, unit, figure_colour(palette.link));
+        cones.extend(solid::nodes(chain, &self.pose, plain, unit, figure_colour(palette.node)));
+        let ghost = figure_colour(palette.ghost);
         if let Some(grip) = &self.steering.grip {
-            let held = self.pose.nodes[grip.node].as_vec3();
-            shapes.push(Shape::ball(held, HELD_BALL * unit, channels(palette.ghost)));
+            cones.push(Cone::ball(self.pose.nodes[grip.node], HELD_BALL * unit, ghost));
+        }
+        let mut shapes: Vec<Shape> = cones.iter().map(Shape::from).collect();
+        if self.shown.ghost && self.ghost.nodes != self.pose.nodes {
+            let bare = solid::links(chain, &self.ghost, |_| true, GHOST * unit, ghost);
+            shapes.extend(bare.iter().map(|cone| Shape::from(cone).unlit()));
         }
         if let Some(body) = &self.body {
-            let longest = body.extremes[1].max(f64::MIN_POSITIVE);
+            let (longest, colour) = (body.extremes[1].max(f64::MIN_POSITIVE), figure_colour(palette.force));
             for (node, force) in body.contacts() {
                 // The shapes' own places are those of the node at rest: the GPU moves them with it.
-                let rest = body.rest(node);
-                let colour = channels(palette.force);
-                shapes.push(Shape::ball(rest, CONTACT_BALL * unit, colour).anchored(node));
+                let rest = body.rest(node).as_dvec3();
+                let mut cones = vec![Cone::ball(rest, CONTACT_BALL * unit, colour)];
                 if self.shown.forces {
                     // On the proxy, against the force on the object: the arrow stands out of the surface.
-                    let span = (-force * (f64::from(LONGEST_ARROW * self.extent) / longest)).as_vec3();
-                    let arrow = Shape::arrow(rest, span, ARROW * unit, colour);
-                    shapes.extend(arrow.into_iter().map(|shape| shape.anchored(node)));
+                    cones.extend(Cone::arrow(rest, -force * (LONGEST_ARROW * extent / longest), ARROW * unit, colour));
                 }
+                shapes.extend(cones.iter().map(|cone| Shape::from(cone).anchored(node)));
             }
         }
         shapes
-    }
-}
-
-/// Links of a proxy from joint to joint, those that `is_shown`: `unit` is their radius.
-fn rods(pose: &Pose, is_shown: impl Fn(usize) -> bool, unit: f32, colour: [f32; 3]) -> Vec<Shape> {
-    let joints = pose.origins.iter().map(|origin| origin.as_vec3());
-    let tip = pose.nodes.last().map(|tip| tip.as_vec3());
-    let stops: Vec<Vec3> = joints.chain(tip).collect();
-    let shown = |(number, _): &(usize, &[Vec3])| is_shown(*number);
-    let mut shapes: Vec<Shape> = (stops.windows(2).enumerate().filter(shown))
-        .map(|(_, ends)| Shape::capsule(ends[0], ends[1], unit, colour))
-        .collect();
-    let shown = pose.origins.iter().enumerate().filter(|(number, _)| is_shown(*number));
-    shapes.extend(shown.map(|(_, origin)| Shape::ball(origin.as_vec3(), JOINT_BALL * unit, colour)));
-    shapes
-}
-
-/// Contact nodes of a proxy on those links that `is_shown`; `links` has the link of each.
-fn nodes(pose: &Pose, links: &[usize], is_shown: impl Fn(usize) -> bool, unit: f32, colour: [f32; 3]) -> Vec<Shape> {
-    let shown = pose.nodes.iter().zip(links).filter(|(_, link)| is_shown(**link));
-    shown.map(|(place, _)| Shape::ball(place.as_vec3(), NODE_BALL * unit, colour)).collect()
-}
-
-fn channels(colour: Color32) -> [f32; 3] {
-    [colour.r(), colour.g(), colour.b()].map(|channel| f32::from(channel) / 255.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use glam::DVec3;
-
-    #[test]
-    fn an_arm_has_a_rod_a_link_and_a_ball_a_node() {
-        let pose = Pose { origins: vec![DVec3::ZERO, DVec3::X], nodes: vec![DVec3::Y; 3], ..Pose::default() };
-        let count = |shown: fn(usize) -> bool| {
-            rods(&pose, shown, 0.1, [0.0; 3]).len() + nodes(&pose, &[0, 1, 1], shown, 0.1, [1.0; 3]).len()
-        };
-        assert_eq!(count(|_| true), 2 + 2 + 3);
-        assert_eq!(count(|link| link != 1), 1 + 1 + 1, "a link with a shape is drawn by it");
     }
 }

@@ -15,7 +15,6 @@ use super::{
 use crate::{
     JointVector,
     dataset::Dataset,
-    gpu::Context,
     render::{haptic::Haptics, setup::SetupError},
     scene::HapticsSpec,
 };
@@ -58,14 +57,8 @@ impl Session {
     ///
     /// # Errors
     /// In words, when it cannot be felt as the scene has it, or with that device.
-    pub fn new(
-        loaded: Loaded,
-        context: &Arc<Context>,
-        pace: TickSource,
-        device: Option<&DeviceChoice>,
-        wake: impl Fn() + Send + 'static,
-    ) -> Result<Self, String> {
-        let controls = Controls::new(&loaded, context, wake);
+    pub fn new(loaded: Loaded, pace: TickSource, device: Option<&DeviceChoice>) -> Result<Self, String> {
+        let controls = Controls::new(&loaded);
         let gains = controls.tuning.haptics.clone();
         let haptics = Arc::clone(&loaded.setup.haptics);
         let history = History::new(haptics.period()).ok_or("no memory for histograms; close other programs")?;
@@ -198,7 +191,6 @@ impl Session {
 mod tests {
     use super::*;
     use crate::{
-        gpu::AdapterChoice,
         scene::{Interpolation, Scene},
         sweep::baked,
     };
@@ -209,8 +201,7 @@ mod tests {
         let text = include_str!("../../tests/scenes/sphere.toml").replace("count = 36", "count = 3");
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
         let loaded = Loaded::new(baked(&scene).unwrap().0, None, None).unwrap();
-        let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-        let mut session = Session::new(loaded, &context, TickSource::Steps, None, || ()).unwrap();
+        let mut session = Session::new(loaded, TickSource::Steps, None).unwrap();
         let (open, gate) = mpsc::channel::<()>();
         let other = HapticsSpec { interpolation: Interpolation::Potential, ..session.controls.tuning.haptics.clone() };
         session.controls.tuning.haptics = other.clone();

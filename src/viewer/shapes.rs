@@ -1,9 +1,9 @@
-//! Rounded cones, drawn besides the surface: links, nodes, force arrows, axes.
+//! Rounded cones as the device draws them: links, nodes, force arrows.
 
+use crate::draw::solid::Cone;
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
 
-/// A rounded cone between two ends.
+/// A [`Cone`] on the device.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Shape {
@@ -16,41 +16,15 @@ pub struct Shape {
     anchor: u32,
 }
 
-/// An arrow over the radius of its shaft (1): length below which it is not seen for the ball at its tail; length and
-/// radius of its head. And the head's greatest share of the whole (1).
-const LEAST_ARROW: f32 = 2.0;
-const HEAD_LENGTH: f32 = 5.0;
-const HEAD_RADIUS: f32 = 2.2;
-const HEAD_SHARE: f32 = 0.6;
-
-/// Red, green, blue, gamma-encoded, from 0 to 1.
-pub type Colour = [f32; 3];
+impl From<&Cone> for Shape {
+    fn from(cone: &Cone) -> Self {
+        let end = |k: usize| cone.ends[k].as_vec3().extend(cone.radii[k] as f32).to_array();
+        let [red, green, blue] = cone.colour.channels();
+        Self { tail: end(0), head: end(1), colour: [red, green, blue, 1.0], anchor: 0 }
+    }
+}
 
 impl Shape {
-    /// A ball.
-    #[must_use]
-    pub fn ball(centre: Vec3, radius: f32, colour: Colour) -> Self {
-        Self::capsule(centre, centre, radius, colour)
-    }
-
-    /// A rod with round ends.
-    #[must_use]
-    pub fn capsule(from: Vec3, to: Vec3, radius: f32, colour: Colour) -> Self {
-        Self::cone(from, to, [radius, radius], colour)
-    }
-
-    /// A rod whose radius goes from the first to the second number.
-    #[must_use]
-    pub fn cone(from: Vec3, to: Vec3, radii: [f32; 2], colour: Colour) -> Self {
-        let [red, green, blue] = colour;
-        Self {
-            tail: from.extend(radii[0]).to_array(),
-            head: to.extend(radii[1]).to_array(),
-            colour: [red, green, blue, 1.0],
-            anchor: 0,
-        }
-    }
-
     /// The same in its plain colour, whatever the light.
     #[must_use]
     pub fn unlit(mut self) -> Self {
@@ -63,21 +37,6 @@ impl Shape {
     pub fn anchored(mut self, node: usize) -> Self {
         self.anchor = node as u32 + 1;
         self
-    }
-
-    /// An arrow from `tail` along `span`, with a shaft of the given radius; none for a span too short to show.
-    #[must_use]
-    pub fn arrow(tail: Vec3, span: Vec3, radius: f32, colour: Colour) -> Vec<Self> {
-        let length = span.length();
-        if length < LEAST_ARROW * radius {
-            return Vec::new();
-        }
-        let head_length = (HEAD_LENGTH * radius).min(HEAD_SHARE * length);
-        let neck = tail + span * (1.0 - head_length / length);
-        vec![
-            Self::capsule(tail, neck, radius, colour),
-            Self::cone(neck, tail + span, [HEAD_RADIUS * radius, 0.0], colour),
-        ]
     }
 }
 
@@ -112,6 +71,7 @@ pub(super) fn unit_shape() -> Vec<[f32; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     #[test]
     fn the_unit_shape_is_closed_and_of_unit_radius() {
@@ -127,12 +87,5 @@ mod tests {
         }
         let ball = 4.0 / 3.0 * std::f32::consts::PI;
         assert!((volume.abs() / ball - 1.0).abs() < 0.05, "{volume}");
-    }
-
-    #[test]
-    fn an_arrow_ends_where_its_span_ends_and_vanishes_with_it() {
-        let arrow = Shape::arrow(Vec3::ONE, Vec3::X, 0.01, [1.0, 0.0, 0.0]);
-        assert_eq!(arrow[1].head, [2.0, 1.0, 1.0, 0.0]);
-        assert!(Shape::arrow(Vec3::ONE, Vec3::ZERO, 0.01, [1.0, 0.0, 0.0]).is_empty());
     }
 }

@@ -17,7 +17,7 @@ use crate::{
     JointVector,
     contact::Status,
     dataset::{Dataset, Grid},
-    report::colour::ColourMap,
+    draw::colour::ColourMap,
 };
 use eframe::egui::{
     self, ColorImage, ComboBox, Painter, Rect, RichText, ScrollArea, Slider, Stroke, StrokeKind, TextureHandle,
@@ -257,7 +257,7 @@ impl Slices {
             ui.label(RichText::new(number(low)).small());
             let width = ui.available_width() - RANGE_WIDTH;
             let (rect, _) = ui.allocate_exact_size(vec2(width.max(LEAST_WIDTH), COLOUR_BAR), egui::Sense::hover());
-            gradient(ui.painter(), rect, map, matches!(map, ColourMap::Root { .. }));
+            gradient(ui.painter(), rect, map);
             ui.label(RichText::new(number(high)).small());
         });
         let lost = dataset.status_counts();
@@ -303,17 +303,15 @@ fn picture(dataset: &Dataset, key: &Key, map: ColourMap, palette: &Palette) -> C
     ColorImage::new(size, plane(grid, key).map(|(_, point)| colour(point)).collect())
 }
 
-/// A colour bar from left to right; `by_root`: the map's own scale is that of a square root.
-pub fn gradient(painter: &Painter, rect: Rect, map: ColourMap, by_root: bool) {
+/// A colour bar from left to right.
+pub fn gradient(painter: &Painter, rect: Rect, map: ColourMap) {
     const STEPS: usize = 48;
     /// Overlap of neighbours, so that no ground shows between them (points).
     const SEAM: f32 = 0.6;
-    let [low, high] = map.range();
     for step in 0..STEPS {
         let share = (step as f64 + 0.5) / STEPS as f64;
-        let value = low + (high - low) * if by_root { share * share } else { share };
         let left = rect.left() + rect.width() * step as f32 / STEPS as f32;
         let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(rect.width() / STEPS as f32 + SEAM, rect.height()));
-        painter.rect_filled(cell.intersect(rect), 0.0, palette::egui_colour(map.colour(value)));
+        painter.rect_filled(cell.intersect(rect), 0.0, palette::egui_colour(map.at(share)));
     }
 }

@@ -1,6 +1,7 @@
 //! Sizes and type of the window: one scale of distances, few widths. Everything is in points unless it says otherwise.
 //! Colours are in `palette.rs`.
 
+use crate::draw::ticks;
 use eframe::egui::{self, FontFamily, FontId, Margin, Rangef, RichText, TextStyle, vec2};
 use egui_plot::{AxisHints, GridInput, GridMark};
 
@@ -189,55 +190,28 @@ pub fn upward<'a>(label: &str) -> AxisHints<'a> {
     axis(AxisHints::new_y().label_spacing(Rangef::new(11.0, 15.0)).min_thickness(36.0), label)
 }
 
-/// Marks on an axis up, at most about so many: what is read at a glance.
-const MARKS: f64 = 6.0;
+/// Marks on an axis up, at most so many and one: what is read at a glance. A low plot has two numbers, too: a single one
+/// tells no scale.
+const MARKS: usize = 6;
 /// Least distance of two marks over the least distance of grid lines (1): room for a line of small letters.
 const LEGIBLE: f64 = 2.0;
 
-/// Leads from each of the steps 1, 2, 5 and 10 to the one below it (1).
-const FINER: f64 = 0.39;
-
-/// Returns the marks of an axis up: 1, 2 or 5 times a power of ten apart, so that every range has several with their
-/// numbers.
+/// Returns the marks of an axis up, with round numbers.
 #[must_use]
 pub fn marks(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
-    let mut rough = ((high - low) / MARKS).max(LEGIBLE * input.base_step_size);
-    if !(rough > 0.0 && rough.is_finite()) {
-        return Vec::new();
-    }
-    loop {
-        let power = 10.0_f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough);
-        let step = step.unwrap_or(rough);
-        let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
-        // A low plot has two numbers, too: a single one tells no scale.
-        if last > first || step <= (high - low) / MARKS {
-            return (first..=last).map(|k| GridMark { value: k as f64 * step, step_size: step }).collect();
-        }
-        rough = FINER * step;
-    }
+    let room = (high - low) / (LEGIBLE * input.base_step_size);
+    let marks = |intervals| ticks::ticks([low, high], intervals).marks;
+    let found = ((room as usize).clamp(1, MARKS)..=MARKS).map(marks).find(|marks| marks.len() > 1).unwrap_or_default();
+    let step_size = found.windows(2).map(|pair| pair[1].0 - pair[0].0).next().unwrap_or(0.0);
+    found.into_iter().map(|(value, _)| GridMark { value, step_size }).collect()
 }
 
 /// Writes the number at a mark with the digits that tell it from the next one.
 #[must_use]
 pub fn mark_number(mark: GridMark, _: &std::ops::RangeInclusive<f64>) -> String {
-    let (value, step) = (mark.value + 0.0, mark.step_size);
-    // Rounded: a step of 0.001 has a logarithm beside -3.
-    let decade = |x: f64| (x.abs().log10() + 1e-9).floor();
-    if value == 0.0 {
-        "0".into()
-    } else if value.abs() < LEAST_DECIMAL {
-        let digits = (decade(value) - decade(step)).max(0.0) as usize;
-        format!("{value:.digits$e}")
-    } else {
-        let decimals = (-decade(step)).max(0.0) as usize;
-        format!("{value:.decimals$}")
-    }
+    ticks::apart(mark.value, mark.step_size)
 }
-
-/// Numbers below are written with a power of ten.
-const LEAST_DECIMAL: f64 = 1e-4;
 
 /// Gives `ctx` type and spacing.
 pub fn apply(ctx: &egui::Context) {
@@ -271,7 +245,7 @@ mod tests {
             let count = numbers.len();
             assert!((3..=7).contains(&count), "{low} to {high}: {numbers:?}");
             for (mark, number) in marks.iter().zip(&numbers) {
-                let told: f64 = number.parse().unwrap();
+                let told: f64 = number.replace('−', "-").parse().unwrap();
                 assert!(
                     (told - mark.value).abs() < 1e-3 * mark.step_size + 1e-12 * mark.value.abs(),
                     "{number}: {}",

@@ -8,9 +8,9 @@ use super::{
     shapes::{Shape, unit_shape},
 };
 use crate::{
+    draw::colour::ColourMap,
     gpu::{Context, FrameUpdate, GpuError},
     object::Object,
-    report::colour::ColourMap,
 };
 use std::sync::Arc;
 
@@ -153,11 +153,12 @@ impl ViewRenderer {
                 pass.set_bind_group(0, &bound, &[]);
                 pass.draw(0..3 * surface.triangles, 0..1);
             }
-            if let Some(DrawnLinks { links, frames, colour: [red, green, blue] }) = links {
+            if let Some(DrawnLinks { links, frames, colour }) = links {
                 let buffer =
                     |label, contents: &[u8], usage| filled(device, &self.context.queue, label, contents, usage);
                 let frames = buffer("frames", bytemuck::cast_slice(frames), wgpu::BufferUsages::STORAGE);
-                let colour = [*red, *green, *blue, 1.0];
+                let [red, green, blue] = colour.channels();
+                let colour = [red, green, blue, 1.0];
                 let colour = buffer("colour of links", bytemuck::cast_slice(&colour), wgpu::BufferUsages::VERTEX);
                 let bound = bind(device, &self.links, &[&self.view, &frames]);
                 pass.set_pipeline(&self.links);
@@ -195,7 +196,7 @@ fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>)
     let light = (across * right + above * up + behind * camera.backward()).normalize_or_zero();
     let map = ColourMap::Pale { low: 0.0, high: 1.0 };
     let stop = |number: usize| {
-        let [red, green, blue] = map.colour(number as f64 / 4.0).rgb.map(|channel| f32::from(channel) / 255.0);
+        let [red, green, blue] = map.colour(number as f64 / 4.0).channels();
         [red, green, blue, 1.0]
     };
     View {

@@ -181,7 +181,7 @@ fn a_folder_holds_the_files_of_one_run_and_it_is_told_what_was_replaced() {
     refused(home.path(), &["play", "x.haptize", "--record", "new/motion.svg", "-o", "new"], "cannot be written");
     for again in [
         &["man", "-o", "m"][..],
-        &["accuracy", "scene.toml", "--points", "16", "--configurations", "8", "--rounds", "1", "--effects", "-o", "a"],
+        &["accuracy", "scene.toml", "--points", "16", "--configurations", "8", "--rounds", "1", "-o", "a"],
     ] {
         let first = run(home.path(), again).1;
         assert_eq!(told(&run(home.path(), again).1, "replaced"), files(&first), "{again:?}");

@@ -279,7 +279,7 @@ fn what_a_dataset_does_not_hold_cannot_interpolate() {
 }
 
 #[test]
-fn effects_of_tick_and_frame_have_prices_and_are_left_out_and_taken_back() {
+fn effects_of_tick_and_frame_are_left_out_and_taken_back() {
     let folder = tempfile::tempdir().unwrap();
     let scene = folder.path().join("effects.toml");
     let text = small_scene().replace("[graphics]", "[graphics]\ngravity = [0.0, 0.0, -30.0]\nsmoothing = 0.05");
@@ -292,13 +292,6 @@ fn effects_of_tick_and_frame_have_prices_and_are_left_out_and_taken_back() {
     }
     for absent in ["Contact friction", "Strain stiffening", "Quasi-static object"] {
         assert!(!window.shows(absent), "{absent} is not named");
-    }
-    let prices = |part: &str| window.harness.query_all_by_label_contains(part).count();
-    assert_eq!((prices("µs a frame"), prices("µs a tick")), (2, 1 + 1), "prices, and the costs of interpolation");
-    // Each with its spread, or told to be less than can be measured.
-    for price in window.harness.query_all_by_label_contains("µs a frame") {
-        let told = price.accesskit_node().value().unwrap();
-        assert!(told.contains(" ± ") || told.starts_with("< "), "{told}");
     }
     window.pass(0.5);
     let sagging = window.picture_of("3-D scene");

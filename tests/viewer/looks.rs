@@ -22,15 +22,6 @@ fn looks_as_it_did(theme: Theme, name: &str) {
     window.harness.set_render_cursor(false);
     window.click("Press");
     window.pass(2.2);
-    // What a tick costs is never the same.
-    let scene = window.harness.get_by_label("3-D scene").rect();
-    let costs = window.harness.query_all_by_label_contains("µs a tick").next().unwrap().rect();
-    // Below the controls that are in sight there are the plots.
-    let bottom = window.harness.get_by_label("Configuration").rect().min.y - 10.0;
-    let costs = costs.with_max_x(scene.min.x).with_max_y(costs.max.y.min(bottom));
-    if costs.is_positive() {
-        window.harness.mask(costs);
-    }
     window.harness.snapshot_options(name, &alike());
     if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
         return;

@@ -230,7 +230,7 @@ fn a_window_whose_device_is_lost_says_so_and_paints_nothing_more() {
     let folder = tempfile::tempdir().unwrap();
     let (lost, ctx, mut viewer) = to_be_lost(folder.path());
     viewer.start(&Start::File(SPHERE.1.clone()), &ctx);
-    viewer.wait(&ctx);
+    viewer.wait();
     viewer.play("press");
     assert!(viewer.is_lost().is_none() && viewer.error().is_none());
     let screen = Rect::from_min_size(Pos2::ZERO, vec2(1200.0, 800.0));

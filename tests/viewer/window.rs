@@ -102,8 +102,7 @@ impl Window {
     }
 
     pub fn wait(&mut self) {
-        let ctx = self.harness.ctx.clone();
-        self.harness.state_mut().wait(&ctx);
+        self.harness.state_mut().wait();
         self.harness.run_ok();
     }
 

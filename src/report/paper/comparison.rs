@@ -2,10 +2,8 @@
 
 use super::{Scanned, Scans, Sphere};
 use crate::{
-    report::{
-        force::{EndForce, SteadyForce},
-        ticks::thousands,
-    },
+    draw::ticks::thousands,
+    report::force::{EndForce, SteadyForce},
     scene::{HapticsSpec, PlanSpec, ScanSpec},
 };
 use serde::Serialize;

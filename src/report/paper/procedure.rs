@@ -2,7 +2,7 @@
 //! the dataset to the haptic and the graphics loop, with the numbers of a run.
 
 use super::{Scans, Sphere, comparison::inside};
-use crate::report::{
+use crate::draw::{
     canvas::{Anchor, Area, Canvas},
     chart,
     colour::{self, Colour},

@@ -6,16 +6,15 @@
 use super::{Scanned, Scans};
 use crate::{
     JointVector,
-    report::{
-        PIXELS,
+    draw::{
         canvas::{Area, Canvas, Picture},
         chart,
         colour::{self, Colour},
-        object::draw_proxy,
         plot,
         raster::{Camera, Finish, Raster, Vertex},
         ticks,
     },
+    report::{PIXELS, object::draw_proxy},
     scene::SpecimenSpec,
 };
 use glam::DVec3;

@@ -5,7 +5,7 @@
 //! at the reference's configuration, so many ticks later. What is evaluated errs against the same exact torques as the
 //! look-ups do; its time is that of both threads: a share of the solve, and the tangent.
 
-use super::{Accuracy, AccuracyError, Cost, Row, Study, grids::LOOK_UPS, timed};
+use super::{Accuracy, AccuracyError, Row, Study, grids::LOOK_UPS, in_turns};
 use crate::{
     JointVector,
     contact::{Model, Status},
@@ -82,24 +82,20 @@ pub(super) fn followed(
     let (mut random, period) = (Random::new(SEED), 1.0 / scene.haptics.rate);
     let ways: Vec<JointVector> = reference.places.iter().map(|q| way(model.chain, q, period, &mut random)).collect();
     for interval in INTERVALS {
-        let (mut seconds, mut found) = (Vec::new(), Vec::new());
-        for _ in 0..study.rounds {
+        let (mut found, mut solved) = solutions(&model, &reference.places, &ways, interval);
+        for _ in 1..study.rounds {
             let (again, mean) = solutions(&model, &reference.places, &ways, interval);
-            found = again;
-            seconds.push(mean);
+            (found, solved) = (again, solved.min(mean));
         }
-        let (tangent, ()) = timed(study.rounds, || {
+        let tangents = in_turns(study.rounds, 1, |_| {
             for (solution, q) in found.iter().zip(&reference.places).cycle().take(LOOK_UPS) {
                 black_box(solution.at(black_box(q)));
             }
             Ok::<(), AccuracyError>(())
         })?;
-        let solved = Cost::of(&seconds);
         if interval == 1 {
-            study.solution = solved.median;
+            study.solution = solved;
         }
-        let both = |part: fn(&Cost) -> f64| part(&solved) / interval as f64 + part(&tangent) / LOOK_UPS as f64;
-        let cost = Cost { median: both(|c| c.median), least: both(|c| c.least), greatest: both(|c| c.greatest) };
         let mut answers = found.iter().zip(&reference.places);
         let zero = JointVector::zeros(model.chain.joints.len());
         let (rms, worst) = reference.errors(|_| answers.next().map_or(zero, |(solution, q)| solution.at(q).0));
@@ -111,11 +107,9 @@ pub(super) fn followed(
             points: 0,
             solved: 0,
             bytes: 0,
-            cost: cost.over(study.look_up),
-            unit: "N m",
+            cost: (solved / interval as f64 + tangents[0].0 / LOOK_UPS as f64) / study.look_up,
             rms,
             worst,
-            size: study.torque,
         });
     }
     Ok(())

@@ -1,6 +1,6 @@
-//! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size, loops.
+//! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size.
 
-use super::{Accuracy, AccuracyError, Loops, Row, Study, timed};
+use super::{Accuracy, AccuracyError, Row, Study, in_turns};
 use crate::{
     JointVector,
     dataset::Dataset,
@@ -20,13 +20,10 @@ const COARSER: [f64; 9] = [4.0, 2.828, 2.0, 1.414, 1.0, std::f64::consts::FRAC_1
 /// Look-ups that are timed at once.
 pub(super) const LOOK_UPS: usize = 20_000;
 
-/// Sides of loops, in grid steps.
-const SIDES: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
+/// Grid points at which look-ups are timed: 256 of them stay in the cache, as where a hand moves they do.
+const PLACES: usize = 256;
 
-/// Loops of each size.
-const LOOPS: usize = 24;
-
-pub(super) fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, FieldError> {
+fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, FieldError> {
     let spec = &scene.haptics;
     TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)
 }
@@ -38,120 +35,75 @@ pub(super) fn spacing(
     limit: usize,
     study: &mut Accuracy,
 ) -> Result<Dataset, AccuracyError> {
-    let (own_cost, (own, _)) = timed(study.rounds, || baked(scene))?;
-    let mut before = 0;
+    let mut grids: Vec<Scene> = Vec::new();
     for coarser in COARSER {
         let spaced = spaced(scene, |steps| (steps / coarser).round());
         let count = points(&spaced);
         // Small grids cannot be cut much coarser.
-        if count == before {
+        if grids.last().is_some_and(|last| points(last) == count) {
             continue;
         }
-        before = count;
         if count > limit && coarser != 1.0 {
             study
                 .notes
                 .push(format!("the grid of {count} points is left out: more than {limit} (raise --points to have it)"));
             continue;
         }
-        let (cost, (dataset, report)) = timed(study.rounds, || baked(&spaced))?;
+        grids.push(spaced);
+    }
+    let mut bakes = in_turns(study.rounds, grids.len(), |k| baked(&grids[k]))?;
+    let own = grids.iter().position(|grid| points(grid) == study.points).unwrap_or(0);
+    let own_time = bakes[own].0;
+    for (spaced, (time, (dataset, report))) in grids.iter().zip(&bakes) {
         for interpolation in Interpolation::ALL {
-            let field = field(&spaced, &dataset, interpolation)?;
+            let field = field(spaced, dataset, interpolation)?;
             let (rms, worst) = reference.errors(|q| field.sample(q).torque);
             study.rows.push(Row {
                 study: Study::Spacing,
                 series: interpolation.name().to_owned(),
-                setting: format!("{:.4} {}", spacing_of(&spaced), study.unit),
-                value: spacing_of(&spaced),
-                points: count,
+                setting: format!("{:.4} {}", spacing_of(spaced), study.unit),
+                value: spacing_of(spaced),
+                points: points(spaced),
                 solved: report.contact_points,
                 bytes: dataset.summary().bytes,
-                cost: cost.over(own_cost.least),
-                unit: "N m",
+                cost: time / own_time,
                 rms,
                 worst,
-                size: reference.torque,
             });
         }
     }
-    Ok(own)
+    Ok(bakes.swap_remove(own).1.0)
 }
 
 /// Time of a look-up, relative to that of `linear`.
 pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Result<(), AccuracyError> {
-    let errors = |series: &str, study: &Accuracy| {
-        let own = study.rows.iter().find(|row| row.series == series && row.points == own.grid.points());
-        own.map_or((0.0, 0.0), |row| (row.rms, row.worst))
-    };
-    for interpolation in Interpolation::ALL {
-        let field = field(scene, own, interpolation)?;
-        let places: Vec<JointVector> = (0..256).map(|k| own.grid.configuration(k * own.grid.points() / 256)).collect();
-        let (cost, ()) = timed(study.rounds, || {
-            for k in 0..LOOK_UPS {
-                black_box(field.sample(black_box(&places[k % places.len()])));
-            }
-            Ok::<(), AccuracyError>(())
-        })?;
-        if study.look_up == 0.0 {
-            study.look_up = cost.least / LOOK_UPS as f64;
+    let points = own.grid.points();
+    let places: Vec<JointVector> = (0..PLACES).map(|k| own.grid.configuration(k * points / PLACES)).collect();
+    let fields = Interpolation::ALL.map(|interpolation| field(scene, own, interpolation));
+    let fields = fields.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let timed = in_turns(study.rounds, fields.len(), |k| {
+        for q in places.iter().cycle().take(LOOK_UPS) {
+            black_box(fields[k].sample(black_box(q)));
         }
-        let (rms, worst) = errors(interpolation.name(), study);
+        Ok::<(), AccuracyError>(())
+    })?;
+    study.look_up = timed[0].0 / LOOK_UPS as f64;
+    for (interpolation, (time, ())) in Interpolation::ALL.into_iter().zip(timed) {
+        let series = interpolation.name();
+        let error = study.rows.iter().find(|row| row.series == series && row.points == points);
+        let (rms, worst) = error.map_or((0.0, 0.0), |row| (row.rms, row.worst));
         study.rows.push(Row {
             study: Study::Lookup,
-            series: interpolation.name().to_owned(),
-            setting: interpolation.name().to_owned(),
-            value: f64::from(u8::from(interpolation == Interpolation::Potential)) * 2.0 + 1.0,
-            points: own.grid.points(),
+            series: series.to_owned(),
+            setting: series.to_owned(),
+            value: 0.0,
+            points,
             solved: 0,
             bytes: 0,
-            cost: cost.over(LOOK_UPS as f64 * study.look_up),
-            unit: "N m",
+            cost: time / LOOK_UPS as f64 / study.look_up,
             rms,
             worst,
-            size: study.torque,
         });
-    }
-    Ok(())
-}
-
-/// Work around squares in the plane of the last two joints, about configurations in contact.
-pub(super) fn loops(
-    scene: &Scene,
-    own: &Dataset,
-    reference: &Reference,
-    study: &mut Accuracy,
-) -> Result<(), AccuracyError> {
-    let joints = own.grid.joints();
-    if joints < 2 {
-        study.notes.push("work around loops is not shown: one joint has no loops".to_owned());
-        return Ok(());
-    }
-    let pressed = reference.places.iter().zip(&reference.exact).filter(|(_, tau)| tau.norm() > 0.0);
-    let centres: Vec<&JointVector> = pressed.map(|(q, _)| q).take(LOOPS).collect();
-    for interpolation in Interpolation::ALL {
-        let field = field(scene, own, interpolation)?;
-        for side in SIDES {
-            let around = |centre: &JointVector| {
-                let corner = |a: f64, b: f64| {
-                    let mut q = *centre;
-                    for (axis, sign) in [(joints - 2, a), (joints - 1, b)] {
-                        let line = &own.grid.axes[axis];
-                        let half = 0.5 * side * line.step;
-                        // The whole square moves into the grid, where the field is not faded.
-                        let (first, last) = (line.coordinate(0) + half, line.last() - half);
-                        q[axis] = q[axis].min(last).max(first) + sign * half;
-                    }
-                    q
-                };
-                field.work_around(&[corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)])
-            };
-            let square: f64 = centres.iter().map(|centre| around(centre).powi(2)).sum();
-            study.loops.push(Loops {
-                series: interpolation.name().to_owned(),
-                side: side * own.grid.axes[joints - 1].step,
-                work: (square / centres.len().max(1) as f64).sqrt(),
-            });
-        }
     }
     Ok(())
 }

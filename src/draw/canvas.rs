@@ -5,7 +5,6 @@
 //! marks give equal bytes.
 
 use super::{
-    ReportError,
     colour::{Colour, WHITE},
     font,
 };
@@ -77,6 +76,18 @@ impl TextStyle {
     pub fn width(&self, text: &str) -> f64 {
         font::width(text, self.size, self.weight)
     }
+}
+
+/// A sheet could not be made into a picture.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot rasterise a figure of {width} x {height} pixels: {reason}; ask for a smaller scale")]
+pub struct PictureError {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// The rasteriser's message.
+    pub reason: String,
 }
 
 /// A picture made of pixels, rows from the top.
@@ -205,10 +216,10 @@ impl Canvas {
     /// The sheet as pixels, `scale` pixels a point.
     ///
     /// # Errors
-    /// [`ReportError::Rasterise`] when the sheet has no area or is too large for memory.
-    pub fn pixels(&self, scale: f64) -> Result<Picture, ReportError> {
+    /// [`PictureError`] when the sheet has no area or is too large for memory.
+    pub fn pixels(&self, scale: f64) -> Result<Picture, PictureError> {
         let [width, height] = [self.width, self.height].map(|side| (side * scale).ceil().clamp(0.0, 1e6) as u32);
-        let mut sheet = Pixmap::new(width, height).ok_or_else(|| ReportError::Rasterise {
+        let mut sheet = Pixmap::new(width, height).ok_or_else(|| PictureError {
             width,
             height,
             reason: "it has no area or does not fit into memory".to_owned(),
@@ -384,12 +395,12 @@ impl Picture {
     /// The picture as a PNG file.
     ///
     /// # Errors
-    /// [`ReportError::Rasterise`] when the encoder refuses it.
-    pub fn png(&self) -> Result<Vec<u8>, ReportError> {
+    /// [`PictureError`] when the encoder refuses it.
+    pub fn png(&self) -> Result<Vec<u8>, PictureError> {
         let [width, height] = [self.width as u32, self.height as u32];
         let mut bytes = Vec::new();
         encode_png(&mut bytes, [width, height], png::ColorType::Rgb, self.pixels.as_flattened())
-            .map_err(|error| ReportError::Rasterise { width, height, reason: error.to_string() })?;
+            .map_err(|error| PictureError { width, height, reason: error.to_string() })?;
         Ok(bytes)
     }
 }

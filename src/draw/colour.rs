@@ -28,6 +28,12 @@ impl Colour {
     pub const fn with_opacity(self, opacity: f32) -> Self {
         Self { opacity, ..self }
     }
+
+    /// Red, green, blue as shaders take them: gamma-encoded, from 0 to 1.
+    #[must_use]
+    pub fn channels(self) -> [f32; 3] {
+        self.rgb.map(|channel| f32::from(channel) / 255.0)
+    }
 }
 
 impl fmt::Display for Colour {
@@ -124,7 +130,7 @@ impl ColourMap {
     }
 
     /// Colour at a place of the colour bar, 0 to 1.
-    pub(super) fn at(&self, share: f64) -> Colour {
+    pub(crate) fn at(&self, share: f64) -> Colour {
         let colour = match self {
             Self::Sequential { .. } | Self::Root { .. } => colorous::VIRIDIS.eval_continuous(share),
             Self::Pale { .. } => return pale(share),

@@ -1,7 +1,7 @@
 //! Bodies of revolution and meshes, made of triangles.
 
 use super::{Finish, Raster, Vertex};
-use crate::report::colour::Colour;
+use crate::draw::{colour::Colour, solid::Cone};
 use glam::DVec3;
 
 /// How much nearer, as a fraction of its distance, the edges of a mesh are drawn than its surface: above the rounding
@@ -58,29 +58,24 @@ impl Raster {
         }
     }
 
-    /// A rod with round ends. It is made of short pieces: one that leads past the camera is cut off there, not left
-    /// out.
-    pub fn capsule(&mut self, ends: [DVec3; 2], radius: f64, colour: Colour) {
+    /// Rounded cones. Rods are made of short pieces: one that leads past the camera is cut off there, not left out. The
+    /// wide end of what tapers is flat.
+    pub fn cones(&mut self, cones: &[Cone]) {
         const PIECES: usize = 24;
-        let at = |piece: usize| ends[0].lerp(ends[1], piece as f64 / PIECES as f64);
-        for piece in 0..PIECES {
-            self.frustum([at(piece), at(piece + 1)], [radius, radius], colour);
+        for &Cone { ends: [from, to], radii, colour } in cones {
+            if from == to {
+                self.sphere(from, radii[0], colour);
+            } else if radii[0] == radii[1] {
+                let at = |piece: usize| from.lerp(to, piece as f64 / PIECES as f64);
+                (0..PIECES).for_each(|piece| self.frustum([at(piece), at(piece + 1)], radii, colour));
+                [from, to].into_iter().for_each(|end| self.sphere(end, radii[0], colour));
+            } else {
+                self.frustum([from, to], radii, colour);
+                let outward = if radii[0] > radii[1] { from - to } else { to - from };
+                let (wide, radius) = if radii[0] > radii[1] { (from, radii[0]) } else { (to, radii[1]) };
+                self.disc(wide, outward.normalize_or_zero(), radius, colour);
+            }
         }
-        ends.into_iter().for_each(|end| self.sphere(end, radius, colour));
-    }
-
-    /// An arrow whose tip touches `tip`; its head is two fifths of its length, but never wider than long.
-    pub fn arrow(&mut self, tail: DVec3, tip: DVec3, radius: f64, colour: Colour) {
-        let length = (tip - tail).length();
-        let head = (5.0 * radius).min(0.4 * length);
-        let Some(direction) = (tip - tail).try_normalize() else { return };
-        let neck = tip - head * direction;
-        let shaft = radius.min(0.2 * head);
-        let shaft = if head < 5.0 * radius { shaft } else { radius };
-        self.frustum([tail, neck], [shaft, shaft], colour);
-        self.frustum([neck, tip], [0.5 * head, 0.0], colour);
-        self.disc(tail, -direction, shaft, colour);
-        self.disc(neck, -direction, 0.5 * head, colour);
     }
 
     /// The side of a cone cut off at both ends.
@@ -129,7 +124,7 @@ fn ring(axis: DVec3) -> [DVec3; FACETS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::raster::Camera;
+    use crate::draw::raster::Camera;
 
     const BLUE: Colour = Colour::hex(0x20_50_c0);
 
@@ -145,7 +140,7 @@ mod tests {
     #[test]
     fn a_capsule_is_a_sphere_and_its_length_more() {
         let sphere = covered(|raster| raster.sphere(DVec3::ZERO, 0.3, BLUE));
-        let capsule = covered(|raster| raster.capsule([DVec3::NEG_Z * 0.5, DVec3::Z * 0.5], 0.3, BLUE));
+        let capsule = covered(|raster| raster.cones(&[Cone::rod([DVec3::NEG_Z * 0.5, DVec3::Z * 0.5], 0.3, BLUE)]));
         // Side view: 2 r times the length, seen at an angle; between one and the full length.
         let band = sphere * (2.0 * 0.3) / (std::f64::consts::PI * 0.3 * 0.3);
         assert!(capsule > sphere + 0.8 * band && capsule < sphere + 1.1 * band, "{capsule} {sphere} {band}");
@@ -163,8 +158,8 @@ mod tests {
     }
 
     #[test]
-    fn arrows_without_length_are_not_drawn() {
-        assert_eq!(covered(|raster| raster.arrow(DVec3::X, DVec3::X, 0.1, BLUE)), 0.0);
-        assert!(covered(|raster| raster.arrow(DVec3::ZERO, DVec3::Z, 0.05, BLUE)) > 0.01);
+    fn an_arrow_is_drawn_from_tail_to_tip() {
+        let arrow = |span: DVec3| covered(|raster| raster.cones(&Cone::arrow(DVec3::ZERO, span, 0.05, BLUE)));
+        assert!(arrow(DVec3::Z) > 1.5 * arrow(0.5 * DVec3::Z) && arrow(0.5 * DVec3::Z) > 0.01);
     }
 }

@@ -6,11 +6,8 @@
 //! dataset can predict a measurement better than measuring again does. Samples beside grid points outside the hull are
 //! not predicted.
 
-use crate::{
-    contact::Status,
-    dataset::Dataset,
-    gridize::{GridizeError, GridizeOptions, Samples, gridize},
-};
+use super::{GridizeError, GridizeOptions, Samples, gridize};
+use crate::{contact::Status, dataset::Dataset};
 
 /// Predicted beside measured torque.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]

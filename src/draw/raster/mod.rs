@@ -252,7 +252,7 @@ fn encoded(light: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::colour::{INK, WHITE};
+    use crate::draw::colour::{INK, WHITE};
 
     const RED: Colour = Colour::hex(0xd0_30_20);
 

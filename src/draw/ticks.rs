@@ -65,12 +65,12 @@ pub(crate) fn ticks(range: [f64; 2], intervals: usize) -> Ticks {
     if !(step.is_normal() && unit.is_normal()) {
         return none;
     }
-    let decimals = (0..=6).find(|&decimals| is_whole(step / unit * 10_f64.powi(decimals))).unwrap_or(6);
+    let decimals = decimals(step / unit);
     let first = (low / step - TICK_STEP).ceil();
     let marks = (0..=intervals)
         .map(|index| (first + index as f64) * step)
         .take_while(|&value| value <= high + TICK_STEP * step)
-        .map(|value| (value, number(value / unit, decimals as usize)))
+        .map(|value| (value, number(value / unit, decimals)))
         .collect();
     Ticks { marks, factor: if exponent == 0 { String::new() } else { format!("×10{}", superscript(exponent)) } }
 }
@@ -116,6 +116,26 @@ fn multiples([low, high]: [f64; 2], digits: &[u8]) -> Vec<(f64, String)> {
         .flat_map(|exponent| digits.iter().map(move |digit| mark(exponent, *digit)))
         .filter(|(value, _)| inside(value))
         .collect()
+}
+
+/// Digits after the point that tell numbers a `step` apart.
+fn decimals(step: f64) -> usize {
+    let shifted = |decimals: usize| step * 10_f64.powi(decimals as i32);
+    (0..=6).find(|&decimals| shifted(decimals) > 0.5 && is_whole(shifted(decimals))).unwrap_or(6)
+}
+
+/// Numbers below are written with a power of ten.
+const LEAST_DECIMAL: f64 = 1e-4;
+
+/// Writes `value` with the digits that tell it from one a `step` away, by itself: without a factor in the axis title.
+pub(crate) fn apart(value: f64, step: f64) -> String {
+    // Rounded: a step of 0.001 has a logarithm beside -3.
+    let decade = |x: f64| (x.abs().log10() + 1e-9).floor();
+    if value.abs() < LEAST_DECIMAL && value.abs() > 0.5 * step {
+        let unit = 10_f64.powf(decade(value));
+        return format!("{}e{}", number(value / unit, decimals(step / unit)), decade(value));
+    }
+    number(value, if value.abs() < 0.5 * step { 0 } else { decimals(step) })
 }
 
 /// `value` with `decimals` digits after the point and a typographic minus.
