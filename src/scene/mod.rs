@@ -25,7 +25,7 @@ mod skin;
 pub(crate) mod text;
 mod value;
 
-pub use contact::{Algorithm, ContactSpec, ContactSurface};
+pub use contact::{Algorithm, ContactGeometry, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{arm_note, effort_norms, effort_unit, efforts, lever_arm};
@@ -143,7 +143,7 @@ impl Scene {
     #[must_use]
     pub fn uses_tangent(&self) -> bool {
         matches!(self.haptics.interpolation, Interpolation::Potential | Interpolation::Direct)
-            && self.contact.algorithm == Algorithm::Energy
+            && self.contact.algorithm != Algorithm::Paper
     }
 
     /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene
