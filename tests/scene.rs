@@ -193,6 +193,19 @@ fn a_scene_of_a_former_algorithm_is_drawn_and_felt_but_not_solved() {
 }
 
 #[test]
+fn the_law_of_contact_is_named_by_its_geometry_or_by_the_algorithms_former_name() {
+    let algorithm = |entry: &str| {
+        let text = LEAST.replace("stiffness = 1000", &format!("stiffness = 1000\n{entry}"));
+        parse(&text).unwrap().contact.algorithm
+    };
+    for (geometry, former, expected) in [("following", "energy", Algorithm::Energy), ("rest", "rest", Algorithm::Rest)]
+    {
+        assert_eq!(algorithm(&format!("geometry = \"{geometry}\"")), expected);
+        assert_eq!(algorithm(&format!("algorithm = \"{former}\"")), expected);
+    }
+}
+
+#[test]
 fn the_smooth_surface_is_touched_unless_the_scene_or_the_algorithm_says_otherwise() {
     let surface = |contact: &str, node: &str| {
         let text = LEAST
@@ -307,12 +320,19 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"magic\"", "magic", &["`energy`", "`paper`", "`rest`"]),
     ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised", "leave it out"]),
     ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"linearised\"", "linearised", &["no more", "take \"rest\""]),
+    ("stiffness = 1000", "stiffness = 1000\ngeometry = \"energy\"", "\"energy\"", &["`rest`", "`following`"]),
+    (
+        "stiffness = 1000",
+        "stiffness = 1000\ngeometry = \"rest\"\nalgorithm = \"paper\"",
+        "algorithm",
+        &["leave algorithm out"],
+    ),
     ("stiffness = 1000", "stiffness = 1000\nsurface = \"round\"", "round", &["facets", "smooth"]),
     (
         "stiffness = 1000",
         "stiffness = 1000\nalgorithm = \"paper\"\nsurface = \"smooth\"",
         "smooth",
-        &["defined on the triangles", "energy"],
+        &["defined on the triangles", "leave out"],
     ),
     ("stiffness = 1000", "", "[contact]", &["no stiffness", "stiffness_per_length"]),
     ("stiffness = 1000", "stiffness_per_length = 1e5", "per_length = 1e5", &["{ at = .. }", "of each node instead"]),

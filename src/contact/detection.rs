@@ -25,14 +25,12 @@ use glam::DVec3;
 struct RestDistance {
     /// Unsigned distance to the surface at rest, or a lower bound of it (m).
     distance: f64,
-    /// False while `distance` is only a bound.
-    exact: bool,
+    /// The closest feature at rest, as far as `distance` away; none while that is only a bound.
+    closest: Option<Closest>,
     /// Inside at rest.
     inside: bool,
     /// Has touched since the configuration was taken up, and is reported as a near miss from then on.
     watched: bool,
-    /// Triangle that is closest at rest, where `distance` is exact.
-    closest: u32,
     /// Triangle that was closest last: tried first, which makes the search short.
     last: u32,
 }
@@ -85,7 +83,7 @@ impl Detection {
         for i in std::iter::once(first).chain(0..nodes.len()) {
             let known = &mut self.at_rest[i];
             let radius = model.chain.nodes[i].radius;
-            if !known.exact {
+            if known.closest.is_none() {
                 if known.distance > 0.0 && known.distance - radius > gap {
                     continue;
                 }
@@ -106,9 +104,9 @@ impl Detection {
             known.watched = false;
             // Of a node that stands where it stood in the configuration before, as all do that hang on joints which
             // have not moved, all is known.
-            if !(known.exact && self.nodes[i] == x) {
+            if !(known.closest.is_some() && self.nodes[i] == x) {
                 self.nodes[i] = x;
-                known.exact = false;
+                known.closest = None;
                 known.inside = false;
                 let (bound, near) = model.surface.distance_bound(x);
                 known.distance = bound;
@@ -145,7 +143,7 @@ impl Detection {
             if !known.inside && known.distance - radius > moved {
                 continue;
             }
-            if !known.exact {
+            if known.closest.is_none() {
                 find_at_rest(&model.surface, x, known);
                 if !known.inside && known.distance - radius > moved {
                     continue;
@@ -177,7 +175,8 @@ impl Detection {
         // that.
         let matters = if known.inside || known.watched { f64::MAX } else { radius.max(moved - known.distance) };
         let mut closest = Closest::none();
-        let likely = if moved == 0.0 { known.closest } else { known.last };
+        let at_rest = known.closest.map(|closest| closest.triangle);
+        let likely = at_rest.filter(|_| moved == 0.0).unwrap_or(known.last);
         // None was closest where the pass before was not a number.
         if (likely as usize) < model.object.triangles.len() {
             closest.consider(x, deformation.facet(model, likely), likely, f64::MAX);
@@ -211,31 +210,34 @@ impl Detection {
         if !known.inside && known.distance - radius > reach {
             return None;
         }
-        let mut closest = Closest::none();
-        if known.exact && (known.closest as usize) < model.surface.triangles.len() {
-            closest.consider(x, &model.surface.facet_at_rest(known.closest), known.closest, f64::MAX);
-        } else {
-            closest = find_at_rest(&model.surface, x, known);
-        }
-        if closest.triangle == u32::MAX {
-            return None;
-        }
-        let facet = model.surface.facet_at_rest(closest.triangle);
-        let direction = model.surface.pseudonormal_at_rest(closest.triangle, &closest.point);
-        let row = contact_with(model, i, x, &closest, &facet, direction);
-        (row.depth >= -reach).then_some(row)
+        let closest = known.closest.unwrap_or_else(|| find_at_rest(&model.surface, x, known));
+        row_at_rest(model, i, x, &closest).filter(|row| row.depth >= -reach)
+    }
+
+    /// The same of the place `x` next to the node (m).
+    pub fn near_at_rest(&self, model: &Model, i: usize, x: DVec3) -> Option<Contact> {
+        row_at_rest(model, i, x, &model.surface.closest(x, self.at_rest[i].last))
     }
 }
 
 /// Closest feature at rest; notes distance and side.
 fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Closest {
     let closest = surface.closest(x, known.last);
-    known.exact = true;
+    known.closest = Some(closest);
     known.distance = closest.distance_squared.sqrt();
-    known.closest = closest.triangle;
     known.last = closest.triangle;
     known.inside = surface.is_inside(x, &closest);
     closest
+}
+
+/// The row of proxy node `i` at `x` before the surface at rest, to which `closest` is closest; none where nothing is.
+fn row_at_rest(model: &Model, i: usize, x: DVec3, closest: &Closest) -> Option<Contact> {
+    if closest.triangle == u32::MAX {
+        return None;
+    }
+    let facet = model.surface.facet_at_rest(closest.triangle);
+    let direction = model.surface.pseudonormal_at_rest(closest.triangle, &closest.point);
+    Some(contact_with(model, i, x, closest, &facet, direction))
 }
 
 /// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side

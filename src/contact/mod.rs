@@ -89,8 +89,8 @@ pub struct Equilibrium {
     pub gap: f64,
     /// Contact torque on the proxy, tau = sum_i J_i^T (force on x_i) (N m).
     pub torque: JointVector,
-    /// Tangent d tau/d q (N m/rad), where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy`,
-    /// and the equilibrium is a converged, strict minimum.
+    /// Tangent d tau/d q (N m/rad), where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy` or
+    /// `rest`, and the equilibrium is a converged, strict minimum.
     pub tangent: Option<JointMatrix>,
     /// Contact forces on the object's nodes, ascending by node, each node once (N).
     pub forces: Vec<NodeForce>,

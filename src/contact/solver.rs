@@ -122,8 +122,12 @@ impl<'a> Solver<'a> {
         equilibrium.residual = outcome.residual;
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
         self.account(&mut equilibrium);
-        if model.with_tangent && outcome.converged && model.contact.algorithm == Algorithm::Energy {
-            equilibrium.tangent = self.energy.tangent(model, &self.pose);
+        if model.with_tangent && outcome.converged {
+            equilibrium.tangent = match self.held_by {
+                HeldBy::Energy => self.energy.tangent(model, &self.pose),
+                HeldBy::Rest => Some(self.rest.tangent(model, &mut self.detection, &self.pose)),
+                HeldBy::Nothing | HeldBy::Paper => None,
+            };
         }
         if is_finite(&equilibrium) {
             if !self.is_covered(&equilibrium) {

@@ -71,9 +71,12 @@ pub enum GpuError {
         "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
     )]
     NoClock(String),
-    /// The kernels do not do this.
-    #[error("the GPU does not solve contact by the algorithm `{0}`. Use --backend cpu, or --algorithm energy")]
-    Unsupported(&'static str),
+    /// The kernels take no contact with the surface at rest.
+    #[error(
+        "the GPU does not solve contact with the surface at rest. Use --backend cpu, or geometry = \"following\" in \
+         [contact]"
+    )]
+    AtRest,
     /// Outputs that no invocation wrote: a dispatch was cut short.
     #[error(
         "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"

@@ -70,7 +70,7 @@ impl DeviceModel {
     pub fn new(context: &Context, model: &contact::Model<'_>, precision: Precision) -> Result<Self, GpuError> {
         let contact::Model { object, chain, compliance, contact, .. } = model;
         if contact.algorithm == Algorithm::Rest {
-            return Err(GpuError::Unsupported(Algorithm::Rest.name()));
+            return Err(GpuError::AtRest);
         }
         if !compliance.is_whole() && contact.algorithm == Algorithm::Paper {
             return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });

@@ -36,6 +36,7 @@ pub(super) struct ContactTable {
     stiffness: f64,
     #[serde(default, deserialize_with = "positive")]
     stiffness_per_length: Option<f64>,
+    geometry: Option<ContactGeometry>,
     /// `None` where it is one that is no more.
     #[serde(default = "default_algorithm", deserialize_with = "algorithm")]
     pub algorithm: Option<Algorithm>,
@@ -47,6 +48,25 @@ pub(super) struct ContactTable {
     surface: ContactSurface,
     /// Of an algorithm that is no more.
     updates: Option<IgnoredAny>,
+}
+
+/// Before which surface depth and direction of a contact node are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ContactGeometry {
+    /// The undeformed surface: a convex problem, with one solution.
+    Rest,
+    /// The deformed surface.
+    Following,
+}
+
+impl From<ContactGeometry> for Algorithm {
+    fn from(geometry: ContactGeometry) -> Self {
+        match geometry {
+            ContactGeometry::Rest => Self::Rest,
+            ContactGeometry::Following => Self::Energy,
+        }
+    }
 }
 
 /// Which surface of a mesh the proxy feels.
@@ -99,7 +119,7 @@ pub enum Algorithm {
 }
 
 impl Algorithm {
-    /// As the scene names it.
+    /// As a dataset's provenance names it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -157,8 +177,16 @@ impl ContactTable {
         }
         let Some(algorithm) = self.algorithm else {
             let message = "the algorithm \"linearised\" is no more, its torque was not the gradient of its energy: take \
-                           \"rest\"";
+                           geometry = \"rest\"";
             return error("algorithm", message);
+        };
+        let algorithm = match self.geometry {
+            Some(_) if checker.has("contact.algorithm") => {
+                let message = "geometry says by which law contact is solved: leave algorithm out";
+                return error("algorithm", message);
+            }
+            Some(geometry) => geometry.into(),
+            None => algorithm,
         };
         let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, mut surface, .. } = self;
         match (stiffness > 0.0, stiffness_per_length) {
@@ -184,8 +212,7 @@ impl ContactTable {
         }
         match (surface, algorithm) {
             (ContactSurface::Smooth, Algorithm::Paper) if checker.has("contact.surface") => {
-                let message =
-                    "the algorithm \"paper\" is defined on the triangles: leave surface out, or take \"energy\"";
+                let message = "the algorithm \"paper\" is defined on the triangles: leave out surface or algorithm";
                 return error("surface", message);
             }
             (ContactSurface::Smooth, Algorithm::Paper) => surface = ContactSurface::Facets,

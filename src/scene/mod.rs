@@ -25,7 +25,7 @@ mod skin;
 pub(crate) mod text;
 mod value;
 
-pub use contact::{Algorithm, ContactSpec, ContactSurface};
+pub use contact::{Algorithm, ContactGeometry, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{arm_note, effort_norms, effort_unit, efforts, lever_arm};
@@ -142,7 +142,7 @@ impl Scene {
     /// Whether the loop interpolates torque with its tangent d tau/d q, so that each equilibrium is to come with it.
     #[must_use]
     pub fn uses_tangent(&self) -> bool {
-        self.haptics.interpolation.is_potential() && self.contact.algorithm == Algorithm::Energy
+        self.haptics.interpolation.is_potential() && self.contact.algorithm != Algorithm::Paper
     }
 
     /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene

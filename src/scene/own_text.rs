@@ -1,7 +1,6 @@
 //! A scene's text brought to what the scene has become, so that a dataset's scene says what was baked.
 
-use super::{AxisSpec, Scene, SceneError};
-use clap::ValueEnum;
+use super::{Algorithm, AxisSpec, Scene, SceneError};
 use toml::{Table, Value};
 
 impl Scene {
@@ -30,9 +29,13 @@ impl Scene {
         };
         set("haptics", "interpolation", self.haptics.interpolation.name().into());
         set("contact", "tolerance", self.contact.tolerance.into());
-        if let Some(algorithm) = self.contact.algorithm.to_possible_value() {
-            set("contact", "algorithm", algorithm.get_name().into());
-        }
+        let (law, other) = match self.contact.algorithm {
+            Algorithm::Energy => (("geometry", "following"), "algorithm"),
+            Algorithm::Rest => (("geometry", "rest"), "algorithm"),
+            Algorithm::Paper => (("algorithm", "paper"), "geometry"),
+        };
+        set("contact", law.0, law.1.into());
+        text.get_mut("contact").and_then(Value::as_table_mut).and_then(|contact| contact.remove(other));
         let Self { text, grid, haptics, contact, .. } = Self::parse(&text.to_string(), &self.path)?;
         Ok(Self { text, grid, haptics, contact, ..self.clone() })
     }
@@ -41,7 +44,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Algorithm, Interpolation};
+    use crate::scene::Interpolation;
 
     #[test]
     fn the_text_says_what_the_scene_has_become() {
@@ -50,8 +53,12 @@ mod tests {
         scene.grid.axes[1].count = 9;
         scene.grid.axes[2].count = 13;
         scene.contact.tolerance = 3e-5;
-        scene.contact.algorithm = Algorithm::Rest;
         scene.haptics.interpolation = Interpolation::Potential;
+        // Paper's iteration feels the triangles.
+        for algorithm in [Algorithm::Rest, Algorithm::Energy] {
+            scene.contact.algorithm = algorithm;
+            assert_eq!(scene.with_own_text().unwrap().contact, scene.contact);
+        }
         let own = scene.with_own_text().unwrap();
         assert_eq!(Scene { text: String::new(), ..own.clone() }, Scene { text: String::new(), ..scene.clone() });
         assert_eq!(Scene::parse(&own.text, "sphere.toml").unwrap(), own);

@@ -48,17 +48,17 @@ const STEPS: usize = 6;
 /// The scene's algorithm gives no energy with a tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the scene's algorithm is not \"energy\", and nodes that refine a grid need the energy of contact with its \
-     tangent: set algorithm = \"energy\" in [contact], or bake the grid alone"
+    "the scene's algorithm is \"paper\", and nodes that refine a grid need the energy of contact with its tangent: leave \
+     algorithm out of [contact], or bake the grid alone"
 )]
 pub struct NoEnergy;
 
 /// Checks that nodes can be solved of `scene`.
 ///
 /// # Errors
-/// [`NoEnergy`] unless its algorithm is [`Algorithm::Energy`].
+/// [`NoEnergy`] where its algorithm is [`Algorithm::Paper`].
 pub fn check_algorithm(scene: &Scene) -> Result<(), NoEnergy> {
-    if scene.contact.algorithm == Algorithm::Energy { Ok(()) } else { Err(NoEnergy) }
+    if scene.contact.algorithm == Algorithm::Paper { Err(NoEnergy) } else { Ok(()) }
 }
 
 /// A solved node.

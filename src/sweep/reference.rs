@@ -173,10 +173,11 @@ impl Reference {
     }
 }
 
-/// The energy form of `contact`, solved to `tolerance`.
+/// `contact` with the geometry that it has, the energy form's where it is the paper's, solved to `tolerance`.
 pub(super) fn tight(contact: ContactSpec, tolerance: f64) -> ContactSpec {
     let max_iterations = contact.max_iterations.saturating_mul(10);
-    ContactSpec { algorithm: Algorithm::Energy, tolerance, max_iterations, ..contact }
+    let algorithm = if contact.algorithm == Algorithm::Paper { Algorithm::Energy } else { contact.algorithm };
+    ContactSpec { algorithm, tolerance, max_iterations, ..contact }
 }
 
 /// `places` solved as `contact` says, on all cores.

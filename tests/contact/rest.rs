@@ -2,12 +2,15 @@
 //! stiffness and depth.
 
 use crate::fixture::{arm, random_configurations, sphere, torus};
-use haptize::contact::{Equilibrium, Model, Solver, Status};
+use haptize::JointVector;
+use haptize::contact::{Backend, Equilibrium, Model, Solver, Status};
 use haptize::fixtures::Random;
 use haptize::fixtures::bodies::{self, PAPER};
+use haptize::joint_matrix::lower;
 use haptize::object::Object;
 use haptize::proxy::Chain;
 use haptize::scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind};
+use haptize::sweep::CpuBackend;
 
 /// Contact at rest of stiffness kc at a contact point (N/m).
 fn contact(kc: f64) -> ContactSpec {
@@ -120,6 +123,74 @@ fn the_torque_is_the_gradient_of_the_energy() {
     }
 }
 
+/// The greatest difference between the tangent and the central differences of the torque, over the tangent's greatest
+/// entry, where contacts neither come nor go nor change facets. None where that is so along no joint.
+fn tangent_error(solver: &mut Solver<'_>, q: &[f64], here: &Equilibrium) -> Option<f64> {
+    let tangent = here.tangent.unwrap();
+    let entries = lower(&tangent, q.len());
+    let size = entries.fold(0.0_f64, |size, entry| size.max(entry.abs()));
+    let mut worst: Option<f64> = None;
+    for l in 0..q.len() {
+        let [before, after] = [-STEP, STEP].map(|step| {
+            let mut moved = q.to_vec();
+            moved[l] += step;
+            solver.solve(&moved)
+        });
+        if touched(&before) == touched(here) && touched(&after) == touched(here) {
+            for (k, row) in tangent.iter().enumerate().take(q.len()) {
+                assert_eq!(row[l], tangent[l][k]);
+                let slope = (after.torque[k] - before.torque[k]) / (2.0 * STEP);
+                worst = Some(worst.unwrap_or(0.0).max((slope - row[l]).abs() / size));
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn the_tangent_is_the_derivative_of_the_torque() {
+    let others = samples().into_iter().filter(|sample| sample.name != "organ");
+    for Sample { name, object, chain, places } in others.chain([shipped("sphere", 24)]) {
+        for kc in [10.0, 1e3, 1e8] {
+            let mut model = Model::new(&object, &chain, contact(kc));
+            model.with_tangent = true;
+            let mut solver = Solver::new(&model);
+            let (mut checked, mut worst) = (0, 0.0_f64);
+            for q in &places {
+                let here = solver.solve(q);
+                if here.status == Status::Contact
+                    && let Some(error) = tangent_error(&mut solver, q, &here)
+                {
+                    worst = worst.max(error);
+                    checked += 1;
+                }
+            }
+            println!("{name}, {kc:e} N/m: {checked} checked, worst {worst:.1e}");
+            assert!(checked > 3, "{name}, {kc} N/m: {checked}");
+            // Coarse bodies are touched next to where the closest point leaps: there the differences err more.
+            let limit = if ["mesh", "touch", "sphere"].contains(&name) { 1e-6 } else { 1e-5 };
+            assert!(worst < limit, "{name}, {kc} N/m: {worst}");
+        }
+    }
+}
+
+#[test]
+fn results_have_the_same_bits_on_any_number_of_threads() {
+    let Sample { object, chain, places, .. } = shipped("mesh", 200);
+    let mut model = Model::new(&object, &chain, contact(1e3));
+    model.with_tangent = true;
+    let places: Vec<JointVector> = places.iter().map(|q| JointVector::from_slice(q)).collect();
+    let [one, three] = [1, 3].map(|threads| CpuBackend::new(&model, threads).unwrap().solve(&places).unwrap());
+    for (one, three) in one.iter().zip(&three) {
+        assert_eq!(
+            (one.energy.to_bits(), &one.torque, &one.forces),
+            (three.energy.to_bits(), &three.torque, &three.forces)
+        );
+        assert_eq!((one.status, one.tangent), (three.status, three.tangent));
+    }
+    assert!(one.iter().filter(|equilibrium| equilibrium.tangent.is_some()).count() > 30);
+}
+
 /// The forces along the normals alone, which push back on the object, are not the gradient: rows change along the
 /// surface, and the comparison notices that.
 #[test]
@@ -140,6 +211,46 @@ fn the_sideways_part_of_the_force_is_needed() {
         worst = worst.max(gradient_error(&mut solver, &q, &here).unwrap_or(0.0));
     }
     assert!(worst > 1e-3, "{worst}");
+}
+
+/// Sides of the closed loops are cut into so many parts.
+const PARTS: usize = 800;
+
+/// Work of the torque around a square of three degrees of the last two joints from `q` on, by the trapezoidal rule, with
+/// the greatest energy (J) and depth (m) on the way.
+fn work_around(solver: &mut Solver<'_>, q: &[f64]) -> (f64, f64, f64) {
+    let step = 3_f64.to_radians() / PARTS as f64;
+    let (mut at, mut sum) = (q.to_vec(), (0.0, 0.0_f64, 0.0_f64));
+    for (joint, step) in [(q.len() - 2, step), (q.len() - 1, step), (q.len() - 2, -step), (q.len() - 1, -step)] {
+        for part in 0..=PARTS {
+            let here = solver.solve(&at);
+            let share = if part == 0 || part == PARTS { 0.5 } else { 1.0 };
+            sum = (sum.0 + share * step * here.torque[joint], sum.1.max(here.energy), sum.2.max(-here.gap));
+            if part < PARTS {
+                at[joint] += step;
+            }
+        }
+    }
+    sum
+}
+
+/// The torus is twice continuously differentiable: all its nodes have six neighbours. Up to its middle, where directions
+/// turn round, what is left of a loop's work is the error of the quadrature, where contacts come and go.
+#[test]
+fn no_closed_loop_makes_work() {
+    let (object, chain) = (torus(), Chain::new(&arm(0.0)));
+    let model = Model::new(&object, &chain, contact(1e3));
+    let mut solver = Solver::new(&model);
+    let (mut loops, mut worst) = (0, 0.0_f64);
+    for q in random_configurations(7, 60) {
+        let (work, greatest, deepest) = work_around(&mut solver, &q);
+        if greatest > 0.0 && deepest < 0.01 {
+            loops += 1;
+            worst = worst.max(work.abs() / greatest);
+        }
+    }
+    println!("{loops} loops, at most {worst:.1e} of the greatest energy");
+    assert!(loops > 3 && worst < 1e-5, "{loops} {worst}");
 }
 
 /// Hard configurations: a bent bar pressed into the sphere, as deep as its middle, from soft to rigid.

@@ -521,7 +521,7 @@ fn contact_at_rest_is_refused() {
     assert!(GpuSolver::new(context(), &model).is_ok());
     model.contact.algorithm = Algorithm::Rest;
     let refusal = GpuSolver::new(context(), &model).err().unwrap();
-    assert!(matches!(refusal, GpuError::Unsupported("rest")), "{refusal}");
+    assert!(matches!(refusal, GpuError::AtRest), "{refusal}");
     assert!(refusal.to_string().contains("--backend cpu"), "{refusal}");
 }
 

@@ -16,6 +16,8 @@
 //! Only nodes that touch somewhere have a row: first those below the surface at rest, and, after the program is solved,
 //! those that the surface has bulged up to, until there are no more.
 
+mod tangent;
+
 use crate::contact::detection::Detection;
 use crate::contact::equilibrium::energy::SolverStats;
 use crate::contact::geometry::smooth::CARRIERS;
@@ -139,18 +141,24 @@ impl RestProgram {
         }
     }
 
+    /// Has `detection` take up the displaced surface, and returns a bound of how far that has moved (m).
+    fn displace(&self, model: &Model, detection: &mut Detection) -> f64 {
+        let bound = model.motion_bound(self.elastic);
+        detection.displace(model, self.support.nodes(), &self.forces, bound);
+        bound.moved
+    }
+
     /// Adds a row for each proxy node without one that the displaced surface has reached, and returns whether there are
     /// any.
     fn add_rows(&mut self, model: &Model, detection: &mut Detection) -> bool {
-        let Self { support, forces, rows, elastic, .. } = self;
-        let bound = model.motion_bound(*elastic);
-        detection.displace(model, support.nodes(), forces, bound);
+        let moved = self.displace(model, detection);
+        let Self { rows, .. } = self;
         let known = rows.len();
         for i in 0..model.chain.nodes.len() {
             if rows[..known].binary_search_by_key(&(i as u32), |row| row.proxy_node).is_ok() {
                 continue;
             }
-            if let Some(row) = detection.at_rest(model, i, bound.moved)
+            if let Some(row) = detection.at_rest(model, i, moved)
                 && row.depth + linear_change(model, &row, detection) > 0.0
             {
                 rows.push(row);
@@ -165,13 +173,8 @@ impl RestProgram {
     #[must_use]
     pub fn force(&self, i: usize) -> DVec3 {
         let Self { rows, slots, displacement, .. } = self;
-        let row = &rows[i];
-        if row.multiplier == 0.0 {
-            return DVec3::ZERO;
-        }
-        let springs = Springs { contacts: rows, slots, kc: 0.0 };
-        let sideways = row.second_variation(&springs.variation(i, displacement)).point;
-        (row.normal + sideways) * row.multiplier
+        let (row, nodes) = (&rows[i], displacement.as_chunks::<3>().0);
+        row.pushed(|j| DVec3::from_array(nodes[slots[i][j] as usize])) * row.multiplier
     }
 
     /// The greatest depth that the forces do not account for, over the greatest at rest (1).

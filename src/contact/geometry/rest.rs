@@ -128,12 +128,15 @@ impl<'a> RestSurface<'a> {
     /// Pseudonormal at `point` of facet `t`, outward, not of length one, with nodes at `positions`; see [`normals`].
     #[must_use]
     pub fn pseudonormal(&self, positions: &[DVec3], t: u32, point: &ClosestPoint) -> DVec3 {
-        let (triangles, topology) = (self.triangles, self.topology);
-        let t = t as usize;
         if self.smooth.is_none() {
-            return normals::pseudonormal(positions, triangles, topology, t, point.feature);
+            return normals::pseudonormal(positions, self.triangles, self.topology, t as usize, point.feature);
         }
-        let facet = |t: usize| self.facet(positions, t as u32);
+        self.smooth_pseudonormal(|t| self.facet(positions, t as u32), t as usize, point)
+    }
+
+    /// The same of a smooth surface with these facets.
+    fn smooth_pseudonormal(&self, facet: impl Fn(usize) -> Facet, t: usize, point: &ClosestPoint) -> DVec3 {
+        let (triangles, topology) = (self.triangles, self.topology);
         match point.feature {
             Feature::Face => facet(t).normal(point.weights),
             Feature::Edge(k) => {
@@ -159,10 +162,10 @@ impl<'a> RestSurface<'a> {
     /// The same at rest.
     #[must_use]
     pub fn pseudonormal_at_rest(&self, t: u32, point: &ClosestPoint) -> DVec3 {
-        if self.smooth.is_some() {
-            return self.pseudonormal(&self.positions, t, point);
-        }
         let t = t as usize;
+        if self.smooth.is_some() {
+            return self.smooth_pseudonormal(|t| self.facet_at_rest(t as u32), t, point);
+        }
         match point.feature {
             Feature::Face => self.normals[t],
             Feature::Edge(k) => self.normals[t] + self.normals[self.topology.across[t][k] as usize],

@@ -306,15 +306,27 @@ impl Contact {
     #[inline]
     #[must_use]
     pub fn variation(&self, v: impl Fn(usize) -> DVec3) -> Variation {
+        if self.multiplier == 0.0 { Variation::translation(self.moved(v)) } else { self.turned(v) }
+    }
+
+    /// Returns how displacements `v` of its nodes move its closest point, and turn the surface there.
+    #[inline]
+    fn turned(&self, v: impl Fn(usize) -> DVec3) -> Variation {
         let mut variation = Variation::translation(self.moved(&v));
-        if self.multiplier != 0.0 {
-            for (tangent, slopes) in variation.tangents.iter_mut().zip(&self.carriers.slopes) {
-                for (j, &slope) in slopes[..self.carriers.count].iter().enumerate() {
-                    *tangent += v(j) * slope;
-                }
+        for (tangent, slopes) in variation.tangents.iter_mut().zip(&self.carriers.slopes) {
+            for (j, &slope) in slopes[..self.carriers.count].iter().enumerate() {
+                *tangent += v(j) * slope;
             }
         }
         variation
+    }
+
+    /// Returns minus the gradient of the depth in the place of the proxy node, where displacements `v` of the row's
+    /// nodes deepen it linearly: the direction of the normal, and along the surface how the row changes there (1).
+    #[inline]
+    #[must_use]
+    pub fn pushed(&self, v: impl Fn(usize) -> DVec3) -> DVec3 {
+        self.normal + self.second_variation(&self.turned(v)).point
     }
 
     /// Returns by how much a variation brings the feature nearer, to first order (m).
