@@ -16,7 +16,7 @@ use haptize::{
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime, SearchCounts, stages::Stages},
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, GraphicsEffects, Scene, Shape},
+    scene::{GraphicsEffects, Scene, Shape},
     sweep::{Backend, BackendChoice, Bake, build_object, sample},
 };
 use std::{
@@ -111,9 +111,7 @@ fn kernels(context: &Arc<Context>, scene: &Scene) -> Result<(), Box<dyn Error>> 
     println!("copies {:.1} GB/s, as many bytes read as written", 1e-9 * copying);
     let adapter = Adapter { copying, hardware };
     let swept = refined(scene, if hardware { SWEPT } else { 1 });
-    for algorithm in [Algorithm::Energy, Algorithm::Paper] {
-        sweep(context, &swept, algorithm, adapter)?;
-    }
+    sweep(context, &swept, adapter)?;
     count(context, if hardware { 1 } else { HOST_STRIDE }, adapter)?;
     let rings = if hardware { &RINGS[..] } else { &RINGS[..3] };
     rings.iter().try_for_each(|&rings| frames(context, scene, rings, adapter))
@@ -140,11 +138,9 @@ fn copying(context: &Context) -> Result<f64, Box<dyn Error>> {
 }
 
 /// One sweep over the scene's whole grid, after one that is not counted: it finds how much one dispatch should hold.
-fn sweep(context: &Arc<Context>, scene: &Scene, algorithm: Algorithm, adapter: Adapter) -> Result<(), Box<dyn Error>> {
-    let mut contact = scene.contact;
-    contact.algorithm = algorithm;
+fn sweep(context: &Arc<Context>, scene: &Scene, adapter: Adapter) -> Result<(), Box<dyn Error>> {
     let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
-    let model = Model::new(&object, &chain, contact);
+    let model = Model::new(&object, &chain, scene.contact);
     let configurations = sample(scene);
     let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
     solver.solve(&configurations)?;
@@ -154,7 +150,7 @@ fn sweep(context: &Arc<Context>, scene: &Scene, algorithm: Algorithm, adapter: A
     let seconds = begin.elapsed().as_secs_f64();
     let touching = equilibria.iter().filter(|equilibrium| equilibrium.gap < 0.0).count();
     println!(
-        "\nsweep, {algorithm:?}: {} configurations, {touching} of them in contact, {} nodes",
+        "\nsweep: {} configurations, {touching} of them in contact, {} nodes",
         configurations.len(),
         object.rest.len()
     );

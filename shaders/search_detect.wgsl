@@ -53,9 +53,7 @@ fn matters_within(node: u32) -> real {
 // No node is displaced by this trial. For all invocations together.
 fn begin_displacing(local: u32) {
     for (var k = local; k < NODE_WORDS; k += WORKGROUP) {
-        // The paper ties nodes wherever they are.
-        let last = min(parameters.covered - min(32u * k, parameters.covered), 32u);
-        atomicStore(&needed[k], select(0u, select((1u << last) - 1u, ~0u, last == 32u), PAPER));
+        atomicStore(&needed[k], 0u);
         ready[k] = 0u;
     }
     workgroupBarrier();

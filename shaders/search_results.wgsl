@@ -12,9 +12,9 @@ override GATHER_WORKGROUP: u32 = 64u;
 @group(0) @binding(4) var<storage, read_write> records: array<vec4<u32>>;
 // Residual, energy, torque and, where it is wanted, the tangent row by row.
 @group(0) @binding(5) var<storage, read_write> amounts: array<real>;
-// Proxy node, facet and feature of each touch, or by the paper's iteration the object nodes that it is tied to.
+// Proxy node, facet and feature of each touch.
 @group(0) @binding(6) var<storage, read_write> touches: array<vec4<u32>>;
-// Weights of the corners and the force on the proxy node, or the force on each of those nodes [N].
+// Weights of the corners and the force on the proxy node [N].
 @group(0) @binding(7) var<storage, read_write> presses: array<real>;
 
 // One workgroup over all configurations.
@@ -71,17 +71,6 @@ fn gather(
     take_place(place);
     if row == 0u {
         write_record(place);
-    }
-    if PAPER {
-        if row < word(TOUCHES) {
-            let tie = at_row(0u, row);
-            let touch = starts[place] + row;
-            touches[touch] = vec4<u32>(word(tie), word(tie + 1u), word(tie + 2u), word(tie + 3u));
-            for (var k = 0u; k < 3u; k += 1u) {
-                write_press(9u * touch + 3u * k, vector_at(at_reaction(row) + 4u * k));
-            }
-        }
-        return;
     }
     let half = word(HALF);
     if word(TOUCHES) == 0u || row >= word(ROWS + half) || scalar(at_numbers(half, row) + DEPTH) <= 0.0 {

@@ -1,11 +1,9 @@
 // What the stages of the search for equilibria share (twin of the whole: src/contact/equilibrium/energy.rs). They work
 // on a number of configurations at once, each of which has a workspace; in f64, or in f32 on devices without it. A
 // round displaces the surface by the trial's forces and finds its contacts (search_detect), judges it (search_judge),
-// and goes on to the next trial (search_step). By the paper's iteration it makes one pass of that (search_detect,
-// search_paper).
+// and goes on to the next trial (search_step).
 //
-// Surface nodes are numbered by place: those that the compliance covers come first, neighbours near each other but for
-// the paper's iteration, whose nodes are numbered as the object's.
+// Surface nodes are numbered by place: those that the compliance covers come first, neighbours near each other.
 
 struct SearchParameters {
     // Configurations of this dispatch, and the place of their first one in the list of those in contact.
@@ -43,7 +41,7 @@ struct SearchParameters {
     // Gaps in f32 are known to this, if they are no greater than known_to [m].
     gap_band: real,
     known_to: real,
-    // Contact stiffness of the first and of the last stage; of the paper's iteration that of its springs [N/m].
+    // Contact stiffness of the first and of the last stage [N/m].
     first_kc: real,
     kc: real,
     // Relative residual at which a configuration has converged.
@@ -66,9 +64,6 @@ override ISOTROPIC: bool = false;
 
 // Whether the tangent is wanted.
 override WITH_TANGENT: bool = false;
-
-// Whether equilibria are those of the paper's iteration.
-override PAPER: bool = false;
 
 // --- Words of a workspace ---
 
@@ -144,9 +139,6 @@ const RESPOND: u32 = 18u;
 const RESPONDED: u32 = 19u;
 const ACCOUNT: u32 = 20u;
 const DONE: u32 = 21u;
-// Of the paper's iteration, which is not DONE: ties, and their forces (search_paper). It iterates in between.
-const TIE: u32 = 22u;
-const PROJECT: u32 = 23u;
 
 // Kinds of trials.
 const AT_REST: u32 = 0u;
@@ -242,11 +234,11 @@ const STIFFENING: u32 = 14u;
 // The linear solve: square of its residual, and where it ends.
 const SQUARE: u32 = 15u;
 const STOP: u32 = 16u;
-const INNER: u32 = 17u;
 // Length of the direction of negative curvature.
-const DESCENT: u32 = 18u;
+const DESCENT: u32 = 17u;
 // By how much the model is less at the step [J].
-const DECREASE: u32 = 19u;
+const DECREASE: u32 = 18u;
+// In fours.
 const SCALARS: u32 = 20u;
 
 // Of each joint a point of its axis; zero where it turns, one where it slides; and the axis.

@@ -54,29 +54,17 @@ pub enum GpuError {
         /// The limit (B).
         limit: u64,
     },
-    /// Only a part of a large object's compliance is formed, and whether the paper's iteration leaves that part is not
-    /// checked.
-    #[error(
-        "the GPU takes objects of at most {limit} surface nodes, not {nodes}, by the paper's iteration. Use --backend \
-         cpu for this scene"
-    )]
-    TooManyNodes {
-        /// Nodes on the surface.
-        nodes: usize,
-        /// Nodes that are taken.
-        limit: usize,
-    },
     /// The adapter cannot say how long a kernel takes.
     #[error(
         "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
     )]
     NoClock(String),
-    /// The kernels take no contact with the surface at rest.
+    /// The kernels take contact with the deformed surface alone, by the energy form.
     #[error(
-        "the GPU does not solve contact with the surface at rest. Use --backend cpu, or geometry = \"following\" in \
+        "the GPU does not solve contact by the algorithm {0}. Use --backend cpu, or geometry = \"following\" in \
          [contact]"
     )]
-    AtRest,
+    Algorithm(&'static str),
     /// Outputs that no invocation wrote: a dispatch was cut short.
     #[error(
         "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"

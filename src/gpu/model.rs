@@ -68,12 +68,9 @@ impl DeviceModel {
     /// # Errors
     /// When a buffer exceeds the device's limits or memory.
     pub fn new(context: &Context, model: &contact::Model<'_>, precision: Precision) -> Result<Self, GpuError> {
-        let contact::Model { object, chain, compliance, contact, .. } = model;
-        if contact.algorithm == Algorithm::Rest {
-            return Err(GpuError::AtRest);
-        }
-        if !compliance.is_whole() && contact.algorithm == Algorithm::Paper {
-            return Err(GpuError::TooManyNodes { nodes: object.surface_nodes, limit: contact::Model::WHOLE });
+        let contact::Model { object, chain, contact, .. } = model;
+        if contact.algorithm != Algorithm::Energy {
+            return Err(GpuError::Algorithm(contact.algorithm.name()));
         }
         let extent = extent(model);
         let rounding = GPU_GAP_BAND_PER_EXTENT * extent

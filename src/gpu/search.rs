@@ -1,8 +1,7 @@
 //! The search for equilibria on the device: its kernels, its buffers, and the rounds that it takes.
 //!
 //! Each configuration in contact has a workspace. In a round its trial displaces the surface, contacts are found, and
-//! the trial is judged and the next one made, or a pass of the paper's iteration; what is done leaves the list of the
-//! unfinished. A submission makes some rounds; the host asks for more while some are unfinished.
+//! the trial is judged and the next one made; what is done leaves the list of the unfinished. A submission makes some rounds; the host asks for more while some are unfinished.
 
 use super::{
     buffer::{Staging, StorageBuffer},
@@ -16,7 +15,6 @@ use super::{
     shaders::{self, Shader},
     stages::Found,
 };
-use crate::scene::Algorithm;
 
 /// Invocations of a workgroup of the other stages; the shaders' defaults.
 const PER_CONFIGURATION: u32 = 64;
@@ -41,6 +39,9 @@ const STAGED_TOUCHES: usize = 16;
 /// Factor from the mean number of touches of one section to the room for those of the next: neighbouring sections
 /// differ little.
 const TOUCHES_MARGIN: f64 = 1.25;
+
+/// Numbers of a touch: see `shaders/search_results.wgsl`.
+const PRESSES_EACH: usize = 6;
 
 /// Bytes of a record, and of the words of a touch (B).
 const WORDS_BYTES: usize = size_of::<[u32; 4]>();
@@ -84,25 +85,15 @@ impl Search {
         let budget = ("LOOP_BUDGET", f64::from(budget));
         let flag = |name, is_set| (name, f64::from(u8::from(is_set)));
         let smooth = flag("SMOOTH", model.is_smooth);
-        let law = [
-            flag("ISOTROPIC", model.is_isotropic),
-            flag("PAPER", model.algorithm == Algorithm::Paper),
-            flag("WITH_TANGENT", model.with_tangent),
-        ];
+        let law = [flag("ISOTROPIC", model.is_isotropic), flag("WITH_TANGENT", model.with_tangent)];
         let kernel = |shaders: &[Shader; 2], overrides: &[(&str, f64)]| {
             Kernel::new(context, model.precision.of(shaders), &[&law, overrides].concat())
         };
         let nodes = ("NODE_WORDS", f64::from(model.parameters.covered.div_ceil(u32::BITS)));
         let detect = kernel(&shaders::SEARCH_DETECT, &[smooth, lanes, budget, nodes])?;
         let unfinished = kernel(&shaders::SEARCH_UNFINISHED, &[])?;
-        let round = match model.algorithm {
-            // Ties are found among all nodes: more invocations share these.
-            Algorithm::Paper => vec![detect, kernel(&shaders::SEARCH_PAPER, &[smooth, budget])?, unfinished],
-            Algorithm::Energy | Algorithm::Rest => {
-                let judge = kernel(&shaders::SEARCH_JUDGE, &[lanes, budget])?;
-                vec![detect, judge, kernel(&shaders::SEARCH_STEP, &[lanes, budget])?, unfinished]
-            }
-        };
+        let judge = kernel(&shaders::SEARCH_JUDGE, &[lanes, budget])?;
+        let round = vec![detect, judge, kernel(&shaders::SEARCH_STEP, &[lanes, budget])?, unfinished];
         Ok(Self {
             arm: kernel(&shaders::SEARCH_ARM, &[])?,
             round,
@@ -124,17 +115,12 @@ impl Search {
         2 + joints + if self.model.with_tangent { joints * joints } else { 0 }
     }
 
-    /// Numbers of a touch: see `shaders/search_results.wgsl`.
-    fn presses_each(&self) -> usize {
-        if self.model.algorithm == Algorithm::Paper { 9 } else { 6 }
-    }
-
     /// Bytes of the records, the amounts, and the words and numbers of `touches` touches, of `count` configurations
     /// (B).
     fn result_bytes(&self, count: usize, touches: usize) -> [u64; 4] {
         let number = self.model.precision.size();
         let amounts = number * self.amounts_each() * count;
-        let presses = number * self.presses_each() * touches;
+        let presses = number * PRESSES_EACH * touches;
         [WORDS_BYTES * count, amounts, WORDS_BYTES * touches, presses].map(|bytes| bytes as u64)
     }
 }
@@ -317,7 +303,7 @@ impl SearchLane {
             if total > self.staged {
                 let precision = search.model.precision;
                 found.touches = self.touches.read(context, total)?;
-                let bytes = self.presses.read(context, precision.size() * search.presses_each() * total)?;
+                let bytes = self.presses.read(context, precision.size() * PRESSES_EACH * total)?;
                 found.presses = precision.decode(&bytes);
             }
             self.touches_each = total as f64 / count.max(1) as f64;

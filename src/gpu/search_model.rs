@@ -12,7 +12,6 @@ use super::{
 use crate::{
     contact::{self, law::depth::MINIMUM_CURVATURE_RADIUS},
     contact::{equilibrium::energy::CONTINUATION_START, geometry::DEPTH_ROUNDING},
-    scene::Algorithm,
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -48,7 +47,6 @@ const ABSENT: u32 = u32::MAX;
 /// The device's copy of a contact model for the search.
 pub(super) struct SearchModel {
     pub precision: Precision,
-    pub algorithm: Algorithm,
     /// Without the configurations, and the room for them.
     pub parameters: SearchParameters,
     pub surface: StorageBuffer,
@@ -100,7 +98,6 @@ impl SearchModel {
         let numbers = |what, numbers: &[f64]| StorageBuffer::from_slice(context, what, &precision.encode(numbers));
         Ok(Self {
             precision,
-            algorithm: model.contact.algorithm,
             parameters,
             surface: numbers("surface for the search", parts.surface.as_flattened())?,
             mesh: StorageBuffer::from_slice(context, "mesh for the search", &parts.mesh)?,
@@ -136,22 +133,18 @@ struct Limits {
 impl Limits {
     fn new(model: &contact::Model<'_>, precision: Precision) -> Self {
         let contact = &model.contact;
-        let kc = match (contact.algorithm, precision) {
-            (Algorithm::Paper, _) => contact.stiffness,
-            (_, Precision::Double) => model.kc,
-            (_, Precision::Single) => stiffness(model),
+        let kc = match precision {
+            Precision::Double => model.kc,
+            Precision::Single => stiffness(model),
         };
-        let first_kc = match contact.algorithm {
-            Algorithm::Energy => kc.min(CONTINUATION_START / model.max_nodal_compliance),
-            Algorithm::Rest | Algorithm::Paper => kc,
-        };
+        let first_kc = kc.min(CONTINUATION_START / model.max_nodal_compliance);
         match precision {
             Precision::Double => Self {
                 first_kc,
                 kc,
                 tolerance: contact.tolerance,
                 iterations: contact.max_iterations,
-                with_tangent: model.with_tangent && contact.algorithm == Algorithm::Energy,
+                with_tangent: model.with_tangent,
                 depth_rounding: DEPTH_ROUNDING * model.surface.extent,
                 least_distance: MINIMUM_CURVATURE_RADIUS,
             },
@@ -283,14 +276,12 @@ struct Numbering {
 }
 
 impl Numbering {
-    /// With covered nodes near each other that are so in the `order` of facets. The paper's iteration prefers nodes of
-    /// lower number: these are numbered as they are.
+    /// With covered nodes near each other that are so in the `order` of facets.
     fn new(model: &contact::Model<'_>, order: &[u32]) -> Self {
         let all = 0..model.object.surface_nodes as u32;
         let is_covered = |node: &u32| model.compliance.place(*node).is_some();
-        let by_number = model.contact.algorithm == Algorithm::Paper;
-        let mut nodes = if by_number { model.compliance.nodes.clone() } else { Vec::new() };
-        let mut is_listed = vec![by_number; all.len()];
+        let mut nodes = Vec::new();
+        let mut is_listed = vec![false; all.len()];
         for node in order.iter().flat_map(|&t| model.object.triangles[t as usize]) {
             if is_covered(&node) && !std::mem::replace(&mut is_listed[node as usize], true) {
                 nodes.push(node);
@@ -325,10 +316,10 @@ mod tests {
     };
 
     /// The sphere of the tests on a smooth surface, with its compliance on the nodes of the upper half.
-    fn with_model(algorithm: Algorithm, kind: SpringKind, check: impl FnOnce(&Model<'_>, &Numbering)) {
+    fn with_model(kind: SpringKind, check: impl FnOnce(&Model<'_>, &Numbering)) {
         let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
         scene.object.material = Material::Springs(SpringSpec { kind, stiffness: 150.0 });
-        let contact = ContactSpec { algorithm, surface: ContactSurface::Smooth, ..scene.contact };
+        let contact = ContactSpec { surface: ContactSurface::Smooth, ..scene.contact };
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
         let mut model = Model::new(&object, &chain, contact);
         let nodes = (0..object.surface_nodes as u32).filter(|&node| model.surface.positions[node as usize].z > 0.0);
@@ -340,7 +331,7 @@ mod tests {
     #[test]
     fn compliance_is_numbered_as_its_nodes_are() {
         for kind in [SpringKind::Isotropic, SpringKind::Axial] {
-            with_model(Algorithm::Energy, kind, |model, numbering| {
+            with_model(kind, |model, numbering| {
                 let (compliance, covered) = (&model.compliance, model.compliance.nodes.len());
                 let (each, renumbered) = (compliance.rows_per_node, numbering.compliance(model));
                 assert_ne!(renumbered, compliance.entries, "neighbours were not near each other");
@@ -356,9 +347,5 @@ mod tests {
                 }
             });
         }
-        // The paper's iteration prefers nodes by their numbers.
-        with_model(Algorithm::Paper, SpringKind::Axial, |model, numbering| {
-            assert_eq!(numbering.compliance(model), model.compliance.entries);
-        });
     }
 }

@@ -37,9 +37,6 @@ const GPU_GIVE_UP_LENGTH: f64 = 1e-6;
 /// iterations.
 const GPU_INNER_TOLERANCE_FLOOR: f64 = 1e-4;
 
-/// Relative residual of the paper's step 2 in f32 (1): ten times better than the least tolerance of the iteration.
-const GPU_PAPER_INNER_TOLERANCE: f64 = 1e-6;
-
 /// One entry point with everything it needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Shader {
@@ -136,9 +133,6 @@ const SMOOTH: &[(&str, f64)] = &[("SMOOTH", 1.0)];
 /// The compliance has one number for a pair of nodes.
 const ISOTROPIC: &[(&str, f64)] = &[("ISOTROPIC", 1.0)];
 
-/// Equilibria are those of the paper's iteration.
-const PAPER: &[(&str, f64)] = &[("PAPER", 1.0)];
-
 /// Search: workspaces and joint axes.
 pub static SEARCH_ARM: [Shader; 2] = in_both(stage(
     "search_arm",
@@ -165,7 +159,7 @@ pub static SEARCH_DETECT: [Shader; 2] = in_both(stage(
         DEPTH_ROWS,
         include_str!("../../shaders/search_detect.wgsl"),
     ],
-    &[&[], SMOOTH, ISOTROPIC, PAPER],
+    &[&[], SMOOTH, ISOTROPIC],
 ));
 
 /// Search: the trial judged.
@@ -193,25 +187,6 @@ pub static SEARCH_STEP: [Shader; 2] = in_both(stage(
     &[&[], ISOTROPIC],
 ));
 
-/// Search: a pass of the paper's iteration.
-pub static SEARCH_PAPER: [Shader; 2] = in_both(stage(
-    "search_paper",
-    "main",
-    &[
-        SEARCH_TYPES,
-        WORKSPACE,
-        SEARCH_STATE,
-        LISTING,
-        CLOSEST_POINT,
-        MESH,
-        FACET,
-        DEFORMED_FACET,
-        SEARCH_SUPPORT,
-        include_str!("../../shaders/search_paper.wgsl"),
-    ],
-    &[PAPER, &[("PAPER", 1.0), ("ISOTROPIC", 1.0)]],
-));
-
 /// Search: what is not done.
 pub static SEARCH_UNFINISHED: [Shader; 2] = in_both(stage(
     "search_unfinished",
@@ -222,11 +197,11 @@ pub static SEARCH_UNFINISHED: [Shader; 2] = in_both(stage(
 
 /// Search: where the touches of each configuration go.
 pub static SEARCH_COUNT: [Shader; 2] =
-    in_both(stage("search_results", "count", &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS], &[&[], PAPER]));
+    in_both(stage("search_results", "count", &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS], &[&[]]));
 
 /// Search: records, and touches without gaps.
 pub static SEARCH_GATHER: [Shader; 2] =
-    in_both(stage("search_results", "gather", &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS], &[&[], PAPER]));
+    in_both(stage("search_results", "gather", &[SEARCH_TYPES, PREFIX_SUM, WORKSPACE, SEARCH_RESULTS], &[&[]]));
 
 /// Graphics with dynamics, and without.
 const MOTIONS: &[&[(&str, f64)]] = &[&[], &[("QUASI_STATIC", 1.0)]];
@@ -272,7 +247,6 @@ pub static ALL: &[&[Shader]] = &[
     &SEARCH_DETECT,
     &SEARCH_JUDGE,
     &SEARCH_STEP,
-    &SEARCH_PAPER,
     &SEARCH_UNFINISHED,
     &SEARCH_COUNT,
     &SEARCH_GATHER,
@@ -344,7 +318,7 @@ const NUMBERS: [(&str, f64); 17] = [
 ];
 
 /// Numbers that follow from rounding: in f32, and in f64.
-const ROUNDED: [(&str, f64, f64); 8] = [
+const ROUNDED: [(&str, f64, f64); 7] = [
     ("LEAST_DIVISOR", GPU_LEAST_DIVISOR as f64, MINIMUM_SQUARE),
     ("FACET_STEP", GPU_FACET_STEP, facet::FACET_STEP),
     ("LENGTH_ROUNDING", GPU_SEARCH_SLACK, LENGTH_ROUNDING),
@@ -352,7 +326,6 @@ const ROUNDED: [(&str, f64, f64); 8] = [
     ("PIVOT_ROUNDING", f32::EPSILON as f64, f64::EPSILON),
     ("INNER_TOLERANCE_FLOOR", GPU_INNER_TOLERANCE_FLOOR, energy::INNER_TOLERANCE_FLOOR),
     ("GIVE_UP_LENGTH", GPU_GIVE_UP_LENGTH, energy::GIVE_UP_LENGTH),
-    ("PAPER_INNER_TOLERANCE", GPU_PAPER_INNER_TOLERANCE, energy::INNER_TOLERANCE_FLOOR),
 ];
 
 impl Shader {

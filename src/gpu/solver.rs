@@ -21,7 +21,6 @@ use super::{
 use crate::{
     JointVector,
     contact::{self, Backend, Equilibrium, Solvers, Status, Work},
-    scene::Algorithm,
 };
 use std::{sync::Arc, time::Instant};
 
@@ -205,10 +204,9 @@ impl HostPart<'_> {
         Ok(results)
     }
 
-    /// Whether f32 or the kernel's room left open what the equilibrium is. The paper's iteration often does not
-    /// converge in any precision, and is then left at that.
+    /// Whether f32 or the kernel's room left open what the equilibrium is.
     fn is_undecided(&self, trust: Trust, result: &Equilibrium) -> bool {
-        let is_settled = trust.precision == Precision::Double || self.model.contact.algorithm == Algorithm::Paper;
+        let is_settled = trust.precision == Precision::Double;
         result.gap.is_nan()
             || result.gap.abs() <= trust.band && trust.precision == Precision::Single
             || match result.status {

@@ -4,20 +4,18 @@
 //!
 //! A depth in f32 is known to some nanometres, which shallow contact feels in its energy and stiff contact in its
 //! forces; worse, the kernels cannot see it. So the CPU's search settles each result in f32 from its forces on, a step
-//! or two away, to a residual that owes nothing to f32. The paper's iteration is taken as it is: what it leads to is
-//! defined by its steps.
+//! or two away, to a residual that owes nothing to f32.
 
 use super::{model::stiffness, precision::Precision, stages::Found};
 use crate::{
     JointVector,
     contact::{
-        self, Equilibrium, MINIMUM_SQUARE, NodeForce, Status,
+        self, Equilibrium, NodeForce, Status,
         equilibrium::energy::StoppingCriteria,
         geometry::closest_point::{ClosestPoint, Feature},
         law::depth::Carriers,
     },
     joint_matrix::{JointMatrix, add_symmetric},
-    scene::Algorithm,
 };
 use glam::DVec3;
 
@@ -57,10 +55,7 @@ pub(super) fn unpack(
     let mut parts = Vec::new();
     for k in start..start + touches as usize {
         let touch = touch_of(model, found, k, &mut parts)?;
-        // A tie without compression is no touch.
-        if touch.force != DVec3::ZERO {
-            result.touches.push(touch);
-        }
+        result.touches.push(touch);
     }
     if flags & HAS_TANGENT != 0 {
         let mut matrix = JointMatrix::default();
@@ -68,7 +63,7 @@ pub(super) fn unpack(
         result.tangent = Some(matrix);
     }
     add_up(parts, &mut result);
-    if precision == Precision::Single && model.contact.algorithm != Algorithm::Paper {
+    if precision == Precision::Single {
         return Some(if status == Status::Contact { settled(model, solver, q, result) } else { result });
     }
     let is_finite = energy.is_finite() && residual.is_finite() && result.torque.is_finite();
@@ -92,18 +87,6 @@ fn touch_of(
 ) -> Option<contact::Touch> {
     let (&[proxy_node, rest @ ..], each) = (found.touches.get(k)?, found.presses.len() / found.touches.len());
     let presses = found.presses.get(each * k..each * (k + 1))?.as_chunks::<3>().0;
-    if model.contact.algorithm == Algorithm::Paper {
-        let forces = [0, 1, 2].map(|j| presses.get(j).map_or(DVec3::NAN, |force| DVec3::from_array(*force)));
-        if !rest.iter().all(|node| (*node as usize) < model.object.surface_nodes) {
-            return None;
-        }
-        parts.extend(rest.into_iter().zip(forces).filter(|(_, force)| *force != DVec3::ZERO));
-        let force = -(forces[0] + forces[1] + forces[2]);
-        // Their shares along the whole.
-        let square = force.length_squared().max(MINIMUM_SQUARE);
-        let carriers = rest.into_iter().zip(forces.map(|part| -part.dot(force) / square)).collect();
-        return Some(contact::Touch { proxy_node, carriers, force });
-    }
     let ([facet, feature, _], &[weights, force]) = (rest, presses) else { return None };
     let point = ClosestPoint { weights, feature: Feature::from_number(feature)? };
     if facet as usize >= model.object.triangles.len() {

@@ -9,7 +9,7 @@ use haptize::{
     joint_matrix::lower,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, ContactSurface, Material, Scene, SpringKind, SpringSpec},
+    scene::{ContactSpec, ContactSurface, Material, Scene, SpringKind, SpringSpec},
     sweep::Backend,
 };
 
@@ -99,17 +99,6 @@ fn other_tolerances_and_stiff_contact_take_the_steps_of_the_cpu() {
         let contact = ContactSpec { tolerance, stiffness, ..scene.contact };
         let model = Model::new(&object, &chain, contact);
         check(&format!("{tolerance:e}, {stiffness} N/m"), &model, &configurations(&scene, 131));
-    }
-}
-
-/// Contact by the paper's iteration.
-#[test]
-fn the_papers_iteration_takes_the_steps_of_the_cpu() {
-    let axial = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
-    for material in [None, Some(axial)] {
-        let (scene, object, chain) = load_of("sphere.toml", material.clone());
-        let model = Model::new(&object, &chain, ContactSpec { algorithm: Algorithm::Paper, ..scene.contact });
-        check(&format!("{material:?}"), &model, &configurations(&scene, 37));
     }
 }
 
