@@ -16,7 +16,7 @@ use std::{
 #[non_exhaustive]
 pub enum TableError {
     /// The file cannot be read.
-    #[error("{}: cannot be read: {source}; check the path and its permissions", .file.display())]
+    #[error("{}: cannot be read: {}", .file.display(), input::remedied(source))]
     Read {
         /// The file.
         file: PathBuf,

@@ -51,6 +51,12 @@ pub(crate) fn open(path: &Path) -> io::Result<File> {
     Err(io::Error::new(io::ErrorKind::InvalidInput, what))
 }
 
+/// Says why a file cannot be read, and what to do: what [`open`] refuses has its remedy already.
+pub(crate) fn remedied(error: &io::Error) -> String {
+    let remedy = if error.kind() == io::ErrorKind::InvalidInput { "" } else { "; check the path and its permissions" };
+    format!("{error}{remedy}")
+}
+
 /// Whether the file at `path` begins with `start`.
 pub(crate) fn begins(path: &Path, start: &[u8]) -> bool {
     let mut head = vec![0; start.len()];

@@ -36,8 +36,8 @@ mod _haptize {
     /// Run the command line `arguments`, the program's name first, and return its exit code. Wrong arguments, and help,
     /// end the process.
     #[pyfunction]
-    fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-        py.detach(|| haptize::cli::run(arguments))
+    fn main(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
+        threads::detach(py, || haptize::cli::run(arguments))
     }
 
     #[pymodule_init]

@@ -141,7 +141,7 @@ fn is_ignored(signal: libc::c_int) -> bool {
 /// Takes the other signals that end or stop a program for SIGTERM.
 #[cfg(unix)]
 fn hear_all() {
-    const OTHERS: [libc::c_int; 11] = [
+    const OTHERS: [libc::c_int; 13] = [
         libc::SIGQUIT,
         libc::SIGTSTP,
         libc::SIGTTIN,
@@ -153,15 +153,28 @@ fn hear_all() {
         libc::SIGPROF,
         libc::SIGXCPU,
         libc::SIGXFSZ,
+        libc::SIGSYS,
+        libc::SIGTRAP,
     ];
     extern "C" fn terminate(_: libc::c_int) {
         // SAFETY: the call may be made in a signal handler.
         unsafe { libc::kill(libc::getpid(), libc::SIGTERM) };
     }
-    for signal in OTHERS.into_iter().filter(|signal| !is_ignored(*signal)) {
+    for signal in OTHERS.into_iter().chain(further_signals()).filter(|signal| !is_ignored(*signal)) {
         // SAFETY: the handler calls nothing that may not be called in one.
         unsafe { libc::signal(signal, terminate as extern "C" fn(libc::c_int) as libc::sighandler_t) };
     }
+}
+
+/// Signals of Linux alone that end a program: those for its own use, and of its real time.
+#[cfg(any(target_os = "linux", target_os = "android"))]
+fn further_signals() -> impl Iterator<Item = libc::c_int> {
+    [libc::SIGIO, libc::SIGPWR, libc::SIGSTKFLT].into_iter().chain(libc::SIGRTMIN()..=libc::SIGRTMAX())
+}
+
+#[cfg(all(unix, not(any(target_os = "linux", target_os = "android"))))]
+fn further_signals() -> impl Iterator<Item = libc::c_int> {
+    std::iter::empty()
 }
 
 /// Ignores `signals`.

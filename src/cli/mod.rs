@@ -184,6 +184,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     // Before the command line is parsed, which takes memory.
     memory::tell_shortage(arguments.iter().any(|argument| argument == "--json"));
+    // A name that forges a line would be printed again and again.
+    let mut texts = arguments.iter().skip(1).map(|argument| argument.to_string_lossy());
+    if let Some(argument) = texts.find(|argument| argument.contains(names::is_disruptive)) {
+        let what =
+            format!("\"{}\" holds characters that break or turn a line: rename the file", names::escaped(&argument));
+        last_words(&what, arguments.iter().any(|argument| argument == "--json"));
+        return WRONG_COMMAND_LINE;
+    }
     let parsed = command_line().try_get_matches_from(arguments);
     let parsed = parsed.and_then(|matches| Ok((CommandLine::from_arg_matches(&matches)?, matches)));
     let (line, matches) = match parsed {
@@ -244,6 +252,9 @@ fn usage(error: &clap::Error) -> u8 {
     }
     u8::try_from(error.exit_code()).unwrap_or(1)
 }
+
+/// Exit code of a wrong command line, as clap has it.
+const WRONG_COMMAND_LINE: u8 = 2;
 
 /// Tells why the program ends: on standard error, and with `json` in one object on standard output.
 fn last_words(message: &str, json: bool) {

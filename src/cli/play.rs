@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let Outputs { filled, recorded, explored } = Outputs::check(arguments, &folder)?;
     let kept = arguments.on_demand.as_ref();
     let exploring = kept.map(|file| arguments.choices.open(&arguments.dataset, file)).transpose()?;
-    let mut dataset = match &exploring {
+    let dataset = match &exploring {
         Some(exploring) => exploring.on_demand.dataset(),
         None => load(&arguments.dataset)?,
     };
@@ -141,11 +141,15 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             }
         }
     })?;
-    if let Some(exploring) = &exploring {
-        // With what was solved meanwhile.
-        dataset = exploring.on_demand.dataset();
-    }
-    let dataset = Arc::new(dataset);
+    let dataset = Arc::new(match &exploring {
+        Some(exploring) => {
+            // The base is large: one at a time.
+            drop(dataset);
+            // With what was solved meanwhile.
+            exploring.on_demand.dataset()
+        }
+        None => dataset,
+    });
     if let Some(timing) = &played.timing {
         timing.refused.iter().for_each(|refused| tell(format_args!("haptize: note: {refused}")));
     }

@@ -74,7 +74,8 @@ fn way_out(model: &Model<'_>, x: DVec3, direction: DVec3) -> Option<f64> {
         let along = normal.dot(direction);
         (along > 0.0 && areas.iter().all(|area| *area >= 0.0)).then(|| a.dot(normal) / along)
     };
-    surface.triangles.iter().filter_map(distance).min_by(f64::total_cmp)
+    // Behind `x` the line leaves other parts.
+    surface.triangles.iter().filter_map(distance).filter(|distance| *distance >= 0.0).min_by(f64::total_cmp)
 }
 
 #[cfg(test)]
@@ -91,11 +92,22 @@ mod tests {
     const SIDES: [f64; 3] = [0.04, 0.04, 0.002];
 
     fn plate() -> Object {
+        plates(&[0.0])
+    }
+
+    /// Plates in the middle of each of `heights` (m).
+    fn plates(heights: &[f64]) -> Object {
         let corner = |k: usize| DVec3::from_array([0, 1, 2].map(|a| ((k >> a & 1) as f64 - 0.5) * SIDES[a]));
         // Each side by its corners, anticlockwise seen from outside.
         let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        object((0..8).map(corner).collect(), triangles).unwrap()
+        let triangles = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+        let (mut nodes, mut all) = (Vec::new(), Vec::new());
+        for height in heights {
+            let first = nodes.len() as u32;
+            nodes.extend((0..8).map(|k| corner(k) + *height * DVec3::Z));
+            all.extend(triangles.clone().map(|triangle| triangle.map(|node| first + node)));
+        }
+        object(nodes, all).unwrap()
     }
 
     /// What a ball on three slides, at `from`, gets past on its way to the places `to`.
@@ -127,6 +139,17 @@ mod tests {
         // A grid may have a point on the middle.
         let at = |z: f64| DVec3::new(0.001, 0.002, z);
         assert!(passed(&plate, at(-0.0003), &[at(0.0)]).is_some());
+    }
+
+    #[test]
+    fn a_part_is_as_thick_as_itself_whatever_lies_before_and_behind_it() {
+        let three = plates(&[-0.03, 0.0, 0.05]);
+        let at = |z: f64| DVec3::new(0.001, 0.002, z);
+        for side in [-1.0, 1.0] {
+            assert_eq!(passed(&three, at(0.0008 * side), &[at(0.0005 * side)]), None);
+            let part = passed(&three, at(0.0008 * side), &[at(-0.0005 * side)]).unwrap();
+            assert!((part.thickness - SIDES[2]).abs() < 1e-12, "{part:?}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::{io, path::PathBuf};
 #[non_exhaustive]
 pub enum Error {
     /// The file is missing, or may not be read.
-    #[error("{path}: cannot be read: {source}; check the path and its permissions")]
+    #[error("{path}: cannot be read: {}", crate::input::remedied(source))]
     Read {
         /// The file.
         path: PathBuf,

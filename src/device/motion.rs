@@ -248,6 +248,9 @@ impl Columns {
     /// Those that `header` names.
     fn named(header: &str, joints: &[JointLabel]) -> Result<Self, String> {
         let columns: Vec<(&str, Option<&str>)> = fields(header, ',').map(heading).collect();
+        if columns.len() == 1 {
+            return Err("the first line is no header of names with commas between them".into());
+        }
         let find = |name: &str, unit: &str| {
             // Tables of haptize hold plain names.
             let mut found = columns.iter().enumerate().filter(|(_, (known, _))| plain(known) == plain(name));

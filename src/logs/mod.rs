@@ -67,7 +67,7 @@ pub enum ImportError {
         /// How many for which reason, and where first.
         listed: String,
         /// What to do, in words.
-        remedy: &'static str,
+        remedy: String,
     },
     /// An MCAP file that cannot be read.
     #[error(transparent)]
@@ -205,13 +205,21 @@ pub fn import(
             progress(ImportProgress { bytes: bytes + read, rows });
         })?;
     }
-    let remedy = if of_robot {
-        "each message has to give position and effort of all joints: choose joints of one publisher by a column \
-         mapping (--columns)"
-    } else {
-        "correct the log or the mapping, or cut off the part that is not a measurement"
-    };
-    import.finish(remedy)
+    import.finish(of_robot)
+}
+
+/// What to do where most rows cannot be used, most of them for `reason`; `of_robot`: they are messages.
+fn remedy(reason: Reason, of_robot: bool, mapping: &Mapping) -> String {
+    let joints = || mapping.joints.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>().join(", ");
+    match reason {
+        Reason::TimeGoesBack => "the clock was set meanwhile: cut off what comes before or behind that".into(),
+        _ if of_robot => format!(
+            "each message has to give position and effort of all joints, {}: choose those of one publisher by a column \
+             mapping (--columns)",
+            joints()
+        ),
+        _ => "correct the log or the mapping, or cut off the part that is not a measurement".into(),
+    }
 }
 
 /// Total size of `files`, for a progress bar (bytes).
@@ -366,12 +374,14 @@ impl<'a> Import<'a> {
         }
     }
 
-    /// `remedy`: what to do where most rows cannot be used.
-    fn finish(mut self, remedy: &'static str) -> Result<Imported, ImportError> {
+    /// `of_robot`: rows are messages.
+    fn finish(mut self, of_robot: bool) -> Result<Imported, ImportError> {
         let is_sound = |reason| matches!(reason, Reason::Absent | Reason::RepeatedTime | Reason::Outlier);
         let broken = |dropped: &&Dropped| !is_sound(dropped.reason);
         let dropped: u64 = self.report.dropped.iter().filter(broken).map(|dropped| dropped.rows).sum();
-        if 2 * dropped > self.report.rows {
+        let most = self.report.dropped.iter().filter(broken).max_by_key(|dropped| dropped.rows);
+        if let Some(most) = most.filter(|_| 2 * dropped > self.report.rows) {
+            let remedy = remedy(most.reason, of_robot, self.mapping);
             return Err(ImportError::MostDropped {
                 dropped,
                 rows: self.report.rows,

@@ -15,7 +15,7 @@ fn read(mapping: &str, log: &str) -> Result<(Samples, ImportReport), ImportError
     let mapping = Mapping::parse(mapping, Path::new("map.toml")).unwrap();
     let mut import = Import::new(&mapping);
     import.read(log.as_bytes(), "log.csv", &mut |_, _| {})?;
-    import.finish("correct the log").map(|imported| (imported.samples, imported.report))
+    import.finish(false).map(|imported| (imported.samples, imported.report))
 }
 
 fn refused(mapping: &str, log: &str) -> String {
@@ -105,7 +105,7 @@ fn a_header_names_each_column_once_in_utf_8() {
         let mapping = Mapping::parse(named, Path::new("map.toml")).unwrap();
         let mut import = Import::new(&mapping);
         import.read(log, "log.csv", &mut |_, _| {})?;
-        import.finish("correct the log").map(|imported| imported.samples.configurations)
+        import.finish(false).map(|imported| imported.samples.configurations)
     };
     let refused = |log: &[u8]| read(log).err().unwrap().to_string();
     assert_eq!(read(b"t,\"x, y\",\"note, or none\",f\n0,1,\"a, b\",2\n1,3,,4\n").unwrap(), [1.0, 3.0]);

@@ -103,8 +103,15 @@ pub enum ObjectError {
     )]
     OtherTetrahedra,
     /// The lattice that fills the surface would be too fine.
-    #[error("cells of this size make {cubes:.0} cubes, more than {limit:.0}: make object.elasticity.cell larger")]
+    #[error(
+        "cells of {cell} m make {cubes:.0} cubes of an object that is {length:.3} m long, more than {limit:.0}: make \
+         object.elasticity.cell larger, or scale a mesh that was drawn in millimetres"
+    )]
     TooManyCubes {
+        /// Size of a cube (m).
+        cell: f64,
+        /// Greatest extent of the surface along an axis (m).
+        length: f64,
         /// Cubes over the box around the surface.
         cubes: f64,
         /// Cubes that are taken.

@@ -99,7 +99,8 @@ impl Lattice {
         let cubes = counts.element_product();
         let countable = cubes <= MAX_CUBES;
         if !countable {
-            return Err(ObjectError::TooManyCubes { cubes, limit: MAX_CUBES });
+            let length = (high - low).max_element();
+            return Err(ObjectError::TooManyCubes { cell, length, cubes, limit: MAX_CUBES });
         }
         // In the middle, so that a box of a whole number of cubes is met exactly.
         let origin = low.midpoint(high) - 0.5 * cell * counts;

@@ -17,7 +17,8 @@ pub enum Fault {
     Stale,
     /// The time between two ticks is too long, or not a positive number.
     #[error(
-        "the time between two ticks was too long or not a positive number: give the loop real-time priority or a core"
+        "the time between two ticks was too long or not a positive number: give the loop real-time priority and a core; \
+         if it has both, look for what holds the machine or the device's driver up"
     )]
     Late,
     /// The loop has missed most of its deadlines for a while.

@@ -40,7 +40,7 @@ const RECOVER: &str = "what is whole comes back by `mcap recover IN.mcap -o OUT.
 #[non_exhaustive]
 pub enum RosError {
     /// The file cannot be opened.
-    #[error("{}: cannot be read: {source}; check the path and its permissions", .file.display())]
+    #[error("{}: cannot be read: {}", .file.display(), crate::input::remedied(source))]
     File {
         /// The file.
         file: PathBuf,
@@ -87,7 +87,7 @@ impl RosError {
             mcap::McapError::UnexpectedEof => {
                 format!("it ends in the middle: {RECOVER}")
             }
-            other => other.to_string(),
+            other => format!("the file is damaged ({other}): {RECOVER}"),
         };
         Self::Mcap { file: file.to_owned(), what }
     }

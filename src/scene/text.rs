@@ -13,7 +13,7 @@ const MAX_BYTES: u64 = 1 << 24;
 pub(crate) fn read(path: &Path) -> Result<String, String> {
     let mut bytes = Vec::new();
     let read = input::open(path).and_then(|stream| stream.take(MAX_BYTES + 1).read_to_end(&mut bytes));
-    read.map_err(|error| format!("{error}; check the path and its permissions"))?;
+    read.map_err(|error| input::remedied(&error))?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(format!("it is longer than {MAX_BYTES} bytes, which no file of this kind is; check the path"));
     }

@@ -111,7 +111,9 @@ pub enum SweepError {
         source: io::Error,
     },
     /// Another process writes the part.
-    #[error("{path}: another process is baking into this file; wait for it, or choose another output")]
+    #[error(
+        "{path}: another process is writing this file, a bake or a session on demand; wait for it, or choose another output"
+    )]
     Busy {
         /// The part.
         path: PathBuf,

@@ -18,7 +18,9 @@ use super::{
 };
 use crate::{
     contact::{MeshRipple, Model},
-    dataset::{self, Axis, CONTACTS, Contacts, Dataset, Grid, Heading, Provenance, Stored, Surface, TOUCHES, Target},
+    dataset::{
+        self, Axis, CONTACTS, Claim, Contacts, Dataset, Grid, Heading, Provenance, Stored, Surface, TOUCHES, Target,
+    },
     memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
@@ -320,6 +322,8 @@ impl<'a> Sweep<'a> {
         // The part grows beside the file that a link leads to: only there can that be replaced.
         let output = &dataset::resolved(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
         dataset::check_place(output).map_err(SweepError::Output)?;
+        let claim = Claim::new(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
+        let _claim = claim.ok_or_else(|| SweepError::Busy { path: output.into() })?;
         let mut binding = self.binding();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;

@@ -41,16 +41,13 @@ pub(super) struct Contents {
 impl Contents {
     /// Reads the file at `path`. What is behind the first damage does not count.
     pub fn read(path: &Path) -> Result<Self, SweepError> {
-        let failed = |source| SweepError::Part { path: path.into(), source };
-        let file = input::open(path).map_err(failed)?;
+        let foreign = |reason: String| SweepError::ForeignPart { path: path.into(), reason };
+        let file = input::open(path).map_err(|error| foreign(error.to_string()))?;
         // SAFETY: the mapping is read-only, and a shard that has its name is not written to any more. Another program
         // that truncates it ends this process, as it would with any mapped file; no haptic loop reads it.
-        let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
+        let map = unsafe { Mmap::map(&file) }.map_err(|error| foreign(error.to_string()))?;
         let found = Found::read(&map).and_then(|found| found.ok_or_else(|| "its beginning is damaged".into()));
-        match found {
-            Ok(found) => Ok(Self { path: path.into(), map, found }),
-            Err(reason) => Err(SweepError::ForeignPart { path: path.into(), reason }),
-        }
+        Ok(Self { path: path.into(), found: found.map_err(foreign)?, map })
     }
 
     /// Everything on which its results depend.
@@ -87,7 +84,7 @@ pub enum MergeError {
         path: PathBuf,
     },
     /// A folder or file cannot be read.
-    #[error("{path}: cannot be read: {source}; check the path and its permissions")]
+    #[error("{path}: cannot be read: {}", input::remedied(source))]
     Unreadable {
         /// Its path.
         path: PathBuf,

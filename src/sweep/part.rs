@@ -172,6 +172,10 @@ impl Part {
     /// takes its date and notices. Results that are there are never thrown away: without `resume` they are an error.
     pub fn open(path: &Path, resume: bool, binding: &mut Binding) -> Result<(Self, Tally), SweepError> {
         let failed = |source| SweepError::Part { path: path.into(), source };
+        if path.is_symlink() {
+            // What it leads to is not this program's.
+            return Err(SweepError::ForeignPart { path: path.into(), reason: "it is a link".into() });
+        }
         // A pipe would be waited for, and a device has no end.
         resolved(path).map_err(|why| SweepError::ForeignPart { path: path.into(), reason: why.to_string() })?;
         let file = OpenOptions::new()

@@ -373,7 +373,7 @@ fn pushed_after(folder: &Path, signal: &'static [Signal]) -> Option<usize> {
 fn a_signal_ends_the_torque_within_two_ticks_and_the_session_keeps_its_files() {
     let folder = slides();
     let path = folder.path();
-    const SIGNALS: [Signal; 5] = [Signal::INT, Signal::TERM, Signal::QUIT, Signal::TSTP, Signal::USR1];
+    const SIGNALS: [Signal; 6] = [Signal::INT, Signal::TERM, Signal::QUIT, Signal::TSTP, Signal::USR1, Signal::SYS];
     for signal in SIGNALS.chunks(1) {
         let (mut ticks, begin) = (Vec::new(), Instant::now());
         while begin.elapsed() < LONGEST_UNREST && !ticks.iter().any(|ticks| *ticks <= 2) {

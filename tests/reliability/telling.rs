@@ -54,6 +54,7 @@ fn names_and_texts_of_files_do_not_command_the_terminal() {
         &["gridize", "escape.csv", "--step", "1"],
         &["play", "x.haptize", "--motion", "escape.csv"],
         &["play", "x.haptize", "--motion", escape],
+        &["info", "x.haptize\nx.haptize: 9 points, sound"],
         &["bake", escape, "--json"],
         &[escape, "--json"],
     ] {
@@ -61,6 +62,7 @@ fn names_and_texts_of_files_do_not_command_the_terminal() {
         for said in [&output.stdout, &output.stderr] {
             let said = String::from_utf8(said.clone()).unwrap();
             assert!(!said.contains(|c: char| c.is_control() && c != '\n'), "{arguments:?}: {said:?}");
+            assert!(!said.contains("\nx.haptize: 9 points"), "{arguments:?}: {said:?}");
         }
     }
 }

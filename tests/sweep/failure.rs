@@ -38,6 +38,27 @@ fn a_file_of_another_kind_is_not_replaced() {
     );
 }
 
+#[test]
+fn what_another_process_writes_or_a_link_leads_to_is_left_alone() {
+    let folder = Folder::new();
+    let begin = || bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX);
+    let claim = haptize::dataset::Claim::new(&folder.output()).unwrap().unwrap();
+    let error = begin().unwrap_err();
+    assert!(matches!(error, SweepError::Busy { .. }) && error.to_string().contains("session on demand"), "{error}");
+    drop(claim);
+    #[cfg(unix)]
+    {
+        let target = folder.0.path().join("notes.txt");
+        std::fs::write(&target, "").unwrap();
+        std::os::unix::fs::symlink(&target, folder.part()).unwrap();
+        let error = begin().unwrap_err();
+        assert!(matches!(error, SweepError::ForeignPart { .. }) && error.to_string().contains("a link"), "{error}");
+        assert_eq!(std::fs::read(&target).unwrap(), b"");
+        std::fs::remove_file(folder.part()).unwrap();
+    }
+    begin().unwrap();
+}
+
 /// The device breaks down for good in the third batch of ten, after a part of it in the same batch; the sweep goes on,
 /// and says both in report and file, also when it is killed later on and resumed.
 #[test]

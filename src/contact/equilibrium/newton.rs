@@ -41,7 +41,7 @@ pub const LEAST_DAMPING: f64 = 0.1;
 
 /// Factor by which damping grows after the first step that E refuses, doubled with each that follows (1) (Nielsen
 /// 1999): five refusals in a row multiply it by a million, which is what rigid contact is stiffer than the object
-/// ([`RIGID_STIFFNESS`]).
+/// (`RIGID_STIFFNESS`).
 pub const DAMPING_GROWTH: f64 = 4.0;
 
 /// Factor by which damping fades after a step that kept most of its promise (1): with 0.1 points in soft contact on
@@ -56,7 +56,7 @@ pub const DAMPING_DECAY: f64 = 0.25;
 pub const CURVATURE_MARGIN: f64 = 5.0;
 
 /// Attempts to find a damping with which the model is convex (1): it doubles at least from one to the next, so that the
-/// last is 1e9, a thousand times what rigid contact is stiffer than the object ([`RIGID_STIFFNESS`]).
+/// last is 1e9, a thousand times what rigid contact is stiffer than the object (`RIGID_STIFFNESS`).
 pub const DAMPING_ATTEMPTS: u32 = 30;
 
 /// How much the model is damped: more from step to step where E refuses them, less where it keeps what they promise
