@@ -17,7 +17,7 @@ use crate::{
     field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError, THRESHOLD},
+    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, ProxyInertia, Rendering, SceneError, THRESHOLD, lever},
 };
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -182,7 +182,6 @@ pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<
     let (scene, threshold, slope);
     if dataset.scene.trim().is_empty() {
         let mut slopes = JointVector::zeros(dataset.grid.joints());
-        let lever = |unit: &str| if unit == "m" { LEVER_ARM } else { 1.0 };
         let axes = slopes.iter_mut().zip(&dataset.grid.axes);
         axes.for_each(|(slope, axis)| *slope = BOUNDARY_SLOPE / lever(&axis.unit).powi(2));
         (scene, threshold, slope) = (Interpolation::Linear, THRESHOLD, slopes);

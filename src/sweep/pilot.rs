@@ -257,7 +257,7 @@ impl Pilot {
             aim,
             relative: aim / torque,
             torque,
-            lever_arm: reference.lever_arm,
+            lever_arm: reference.norm.lever_arm,
             configurations: reference.exact.len(),
             in_contact: reference.in_contact,
             prospects: prospects(&trials, SPACING_SHARE * aim, joints),
