@@ -8,7 +8,7 @@
 //! contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at
 //! free points.
 //!
-//! Another way is a variant of [`Interpolation`], a file here that implements [`Interpolant`], and its line in
+//! Another way is a variant of [`Interpolation`], a file here that implements `Interpolant`, and its line in
 //! [`TorqueField::interpolated`].
 //!
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped
@@ -112,8 +112,9 @@ impl TorqueField {
         Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
     }
 
-    /// Any interpolation over `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
-    /// mixed derivatives from the dataset's tangents where it has them.
+    /// Any interpolation over `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says.
+    /// `threshold` and `slope` count for `linear` alone; `potential` takes its mixed derivatives from the dataset's
+    /// tangents where it has them.
     ///
     /// # Errors
     /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
