@@ -22,8 +22,8 @@ pub(crate) trait Levels: Send + Sync {
     fn horizon(&self) -> u64;
 
     /// Copies the numbers ([`super::record`]) that the first `horizon` blocks of `level` add at the corners of its cell
-    /// with first corner `low`: kind by kind, lengths in steps of the level, zeros where there is no node.
-    /// `C = 2^d`, `W = width(d)`.
+    /// with first corner `low`: kind by kind, lengths in steps of the level, zeros where there is no node; nothing where
+    /// there is no block. `C = 2^d`, `W = width(d)`.
     fn gather<const C: usize, const W: usize>(
         &self,
         level: u32,

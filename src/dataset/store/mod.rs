@@ -310,33 +310,27 @@ impl Levels for Store {
             beyond.iter_mut().zip(near).for_each(|(beyond, near)| *beyond = near.wrapping_add(self.space.stride(a)));
         }
         let mut gathered = Gathered { found: false, whole: true, any: false, failed: false };
-        let (mut beside, mut inside) = (0_usize, 0_usize);
-        loop {
+        let mut blocks = [None; C];
+        for beside in (0..C).filter(|side| side & even == 0) {
             // The corner whose coordinates are all even belongs to a level below: a block of it alone does not exist.
             let is_below = is_one && level > 0 && beside == parity;
             let block = if is_below { None } else { self.blocks.get(keys[beside]) };
-            let block = block.filter(|block| block.number < horizon);
-            gathered.found |= block.is_some();
-            gathered.whole &= is_below || block.is_some();
-            loop {
-                let corner = beside | inside;
-                let place = (corner ^ odd) & places;
-                match block.and_then(|block| block.surplus_at(place, W)) {
-                    Some(surplus) => {
-                        gathered.any = true;
-                        numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
-                        gathered.failed |= block.is_some_and(|block| block.failed >> place & 1 == 1);
-                    }
-                    None => numbers.iter_mut().for_each(|number| number[corner] = 0.0),
+            blocks[beside] = block.filter(|block| block.number < horizon);
+            gathered.found |= blocks[beside].is_some();
+            gathered.whole &= is_below || blocks[beside].is_some();
+        }
+        if !gathered.found {
+            return gathered;
+        }
+        for corner in 0..C {
+            let (block, place) = (blocks[corner & odd], (corner ^ odd) & places);
+            match block.and_then(|block| block.surplus_at(place, W)) {
+                Some(surplus) => {
+                    gathered.any = true;
+                    numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
+                    gathered.failed |= block.is_some_and(|block| block.failed >> place & 1 == 1);
                 }
-                inside = inside.wrapping_sub(even) & even;
-                if inside == 0 {
-                    break;
-                }
-            }
-            beside = beside.wrapping_sub(odd) & odd;
-            if beside == 0 {
-                break;
+                None => numbers.iter_mut().for_each(|number| number[corner] = 0.0),
             }
         }
         gathered
