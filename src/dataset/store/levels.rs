@@ -18,7 +18,7 @@ pub(crate) trait Levels: Send + Sync {
     /// Number of levels, the base included.
     fn count(&self) -> u32;
 
-    /// Number of blocks that are published; none are those of nodes that do not change.
+    /// Number of blocks that are published; 0 where nodes do not change.
     fn horizon(&self) -> u64;
 
     /// Copies the numbers ([`super::record`]) that the first `horizon` blocks of `level` add at the corners of its cell

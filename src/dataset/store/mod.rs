@@ -14,8 +14,9 @@
 //! more than the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a
 //! node are tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and
 //! mixed second derivatives. A node that was not solved has no surplus: there the function is what the coarser levels
-//! say. So w is C1, whichever nodes there are, and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
-//! 3, for hats; here with Hermite data and without the sparse grid's choice of levels.)
+//! say. So w is C1, whichever nodes there are, and exact at all of them, value, gradient and mixed derivatives.
+//! (Bungartz and Griebel 2004, Sparse grids, section 3, for hats; here with Hermite data and without the sparse grid's
+//! choice of levels.)
 //!
 //! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the
 //! blocks of the level below that hold the corners of its cells. Within a published block a node that was not solved
