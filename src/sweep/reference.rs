@@ -154,9 +154,14 @@ impl Reference {
 
     /// Its own error, rms: distance of the same configurations solved a hundred times as roughly (N m).
     pub fn own_error(&self, scene: &Scene, model: &Model<'_>) -> Result<f64, BackendError> {
-        let rougher = equilibria(model, tight(scene.contact, 100.0 * REFERENCE_TOLERANCE), &self.places)?;
-        let mut rougher = rougher.iter().map(|equilibrium| equilibrium.torque);
-        Ok(self.errors(|q| rougher.next().unwrap_or(*q)).0)
+        self.error_of(model, tight(scene.contact, 100.0 * REFERENCE_TOLERANCE))
+    }
+
+    /// Rms distance of the same configurations solved as `contact` says (N m).
+    pub fn error_of(&self, model: &Model<'_>, contact: ContactSpec) -> Result<f64, BackendError> {
+        let solved = equilibria(model, contact, &self.places)?;
+        let mut torques = solved.iter().map(|equilibrium| equilibrium.torque);
+        Ok(self.errors(|q| torques.next().unwrap_or(*q)).0)
     }
 
     /// The same configurations with other torques.
