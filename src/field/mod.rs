@@ -103,21 +103,13 @@ impl Sample {
 }
 
 impl TorqueField {
-    /// The paper's interpolation, [`Interpolation::Linear`], over `dataset`. `threshold`: Ith (1); `slope`: Ks of the
-    /// boundary layer, one per joint (N m/rad).
+    /// The field of `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says. `threshold`,
+    /// Ith (1), and `slope`, Ks of the boundary layer, one per joint (N m/rad), count for `linear` alone; `potential`
+    /// takes its mixed derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
-    /// When the dataset is not consistent, holds numbers that are not finite, or a parameter is out of its range.
-    pub fn new(dataset: &Dataset, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
-        Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
-    }
-
-    /// Any interpolation over `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says.
-    /// `threshold` and `slope` count for `linear` alone; `potential` takes its mixed derivatives from the dataset's
-    /// tangents where it has them.
-    ///
-    /// # Errors
-    /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
+    /// When the dataset is not consistent, holds numbers that are not finite, or lacks the column that `interpolation`
+    /// needs; or a parameter is out of its range.
     pub fn interpolated(
         dataset: &Dataset,
         interpolation: Interpolation,

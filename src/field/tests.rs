@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 const SOFT: f64 = 1e6;
 
 fn rendered(data: &Dataset, slope: f64) -> TorqueField {
-    TorqueField::new(data, 0.5, &vector(&vec![slope; data.grid.joints()])).unwrap()
+    TorqueField::interpolated(data, Interpolation::Linear, 0.5, &vector(&vec![slope; data.grid.joints()])).unwrap()
 }
 
 fn vector(values: &[f64]) -> JointVector {
@@ -210,7 +210,9 @@ fn unconverged_points_are_used_and_flagged() {
 #[test]
 fn inconsistent_datasets_are_refused_with_the_reason() {
     let good = || half_space(grid(&[(-1.0, 0.5, 5), (-1.0, 0.5, 3)]), 2.0);
-    let new = |data: Dataset, threshold: f64, slope: &[f64]| TorqueField::new(&data, threshold, &vector(slope)).err();
+    let new = |data: Dataset, threshold: f64, slope: &[f64]| {
+        TorqueField::interpolated(&data, Interpolation::Linear, threshold, &vector(slope)).err()
+    };
     assert_eq!(new(good(), 0.5, &[1.0, 2.0]), None);
     assert!(matches!(new(good(), 1.0, &[1.0, 2.0]), Some(FieldError::Threshold(_))));
     assert!(matches!(new(good(), f64::NAN, &[1.0, 2.0]), Some(FieldError::Threshold(_))));

@@ -286,7 +286,10 @@ mod tests {
         let mut data = half_space(grid(&[(-0.6, 0.1, 13), (-0.06, 0.01, 13)]), 5.0);
         data.grid.axes[1].unit = "m".into();
         let slopes = JointVector::from_slice(&[BOUNDARY_SLOPE, 100.0 * BOUNDARY_SLOPE]);
-        let (found, expected) = (field(&data, None).unwrap(), TorqueField::new(&data, THRESHOLD, &slopes).unwrap());
+        let (found, expected) = (
+            field(&data, None).unwrap(),
+            TorqueField::interpolated(&data, Interpolation::Linear, THRESHOLD, &slopes).unwrap(),
+        );
         assert_eq!(found.sample(&[0.33, 0.033]), expected.sample(&[0.33, 0.033]));
         assert!(found.sample(&[0.33, 0.033]).contact);
         assert!(field(&data, Some(Interpolation::Potential)).unwrap().is_potential());
