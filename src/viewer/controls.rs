@@ -10,9 +10,7 @@ use super::{
     theme::{CHOICE_WIDTH, GROUP_GAP},
     view_renderer::Quantity,
 };
-use crate::{
-    scene::{Algorithm, EFFECTS, Effect, Interpolation, Scene, Tuning},
-};
+use crate::scene::{Algorithm, EFFECTS, Effect, Interpolation, Scene, Tuning};
 use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
 use std::sync::Arc;
 
