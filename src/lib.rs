@@ -21,7 +21,7 @@
 //!     field::TorqueField,
 //!     object::Object,
 //!     proxy::Chain,
-//!     scene::Scene,
+//!     scene::{Interpolation, Scene},
 //!     sweep::{BackendChoice, ChosenBackend, Run, Sweep},
 //! };
 //! use std::sync::atomic::AtomicBool;
@@ -56,7 +56,9 @@
 //! let (dataset, report) = sweep.run(&mut backend, run)?;
 //! assert_eq!((report.points, report.unconverged), (8, 0));
 //!
-//! let field = TorqueField::new(&dataset, scene.haptics.threshold, &scene.haptics.boundary_slope)?;
+//! let haptics = &scene.haptics;
+//! let field =
+//!     TorqueField::interpolated(&dataset, Interpolation::Linear, haptics.threshold, &haptics.boundary_slope)?;
 //! let above = field.sample(&[0.05]);
 //! assert_eq!(above.torque[0], 0.0); // the ball is not touched yet
 //! let pressed = field.sample(&[0.22]);

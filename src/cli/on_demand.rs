@@ -155,7 +155,7 @@ impl Exploring {
         on_tick: &mut dyn FnMut(&Tick),
     ) -> Result<Played, Failure> {
         let start = *haptics.start(&device.read(0.0).position)?.proxy();
-        let (live, exploration) = self.on_demand.begin(&start)?;
+        let (live, exploration) = self.on_demand.begin(&start, self.on_demand.scene().haptics.interpolation)?;
         let begun = self.began.elapsed().as_secs_f64();
         let options = Options { stop, live: Some(live), on_tick: Some(on_tick) };
         let played = play_timed(haptics, device, graphics, plan, options);

@@ -3,7 +3,7 @@
 use super::{Failure, Report, interrupt, shell, watch};
 use crate::{
     scene::Scene,
-    sweep::{BackendChoice, Plan},
+    sweep::{BackendChoice, Forecast, Plan},
 };
 use std::{
     fmt::{self, Write},
@@ -109,14 +109,8 @@ fn describe(text: &mut String, plan: &Plan, arguments: &Arguments, lines: &Lines
     let (count, points) = (plan.shards.len(), plan.points);
     let skipped = points - plan.solved;
     writeln!(text, "{}: {points} points in {count} shards, {skipped} of them proven free", arguments.scene.display())?;
-    if let Some(forecast) = plan.forecast {
-        writeln!(
-            text,
-            "  contact      {:.0} % of {} sampled points",
-            100.0 * forecast.contact_fraction,
-            forecast.sampled
-        )?;
-    }
+    let Forecast { contact_fraction, sampled, .. } = plan.forecast;
+    writeln!(text, "  contact      {:.0} % of {sampled} sampled points", 100.0 * contact_fraction)?;
     match (plan.seconds(), plan.longest()) {
         (Some(all), Some(longest)) => writeln!(
             text,

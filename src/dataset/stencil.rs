@@ -52,6 +52,13 @@ impl Grid {
         self.axes.iter().zip(q).fold(1.0, |fade, (axis, &coordinate)| fade.min(axis.fade(coordinate)))
     }
 
+    /// First grid lines of the cell that begins at `point`, if one does; an axis of one line is a cell without extent.
+    pub(crate) fn cell_from(&self, point: usize) -> Option<[u32; MAX_JOINTS]> {
+        let low = self.lines(point);
+        let begins = |(axis, line): (&Axis, &usize)| line + 1 < axis.count || axis.count == 1;
+        self.axes.iter().zip(&low).all(begins).then(|| low.map(|line| line as u32))
+    }
+
     /// The cell around `q`, which has one entry per joint, in a sound grid ([`Grid::check`]). A configuration that is
     /// not finite is outside, with `fade` zero.
     #[must_use]

@@ -134,11 +134,13 @@ mod tests {
         JointVector,
         field::Sample,
         field::synthetic::{grid, half_space},
+        scene::Interpolation,
     };
 
     fn field(joints: usize) -> TorqueField {
         let data = half_space(grid(&vec![(-0.6, 0.3, 5); joints]), 5.0);
-        TorqueField::new(&data, 0.5, &JointVector::from_slice(&vec![15.0; joints])).unwrap()
+        TorqueField::interpolated(&data, Interpolation::Linear, 0.5, &JointVector::from_slice(&vec![15.0; joints]))
+            .unwrap()
     }
 
     #[test]

@@ -8,7 +8,7 @@
 //! contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at
 //! free points.
 //!
-//! Another way is a variant of [`Interpolation`], a file here that implements [`Interpolant`], and its line in
+//! Another way is a variant of [`Interpolation`], a file here that implements `Interpolant`, and its line in
 //! [`TorqueField::interpolated`].
 //!
 //! A field owns a copy of what it needs, interleaved point by point. The real-time thread thus never touches a mapped
@@ -103,20 +103,13 @@ impl Sample {
 }
 
 impl TorqueField {
-    /// The paper's interpolation, [`Interpolation::Linear`], over `dataset`. `threshold`: Ith (1); `slope`: Ks of the
-    /// boundary layer, one per joint (N m/rad).
+    /// The field of `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says. `threshold`,
+    /// Ith (1), and `slope`, Ks of the boundary layer, one per joint (N m/rad), count for `linear` alone; `potential`
+    /// takes its mixed derivatives from the dataset's tangents where it has them.
     ///
     /// # Errors
-    /// When the dataset is not consistent, holds numbers that are not finite, or a parameter is out of its range.
-    pub fn new(dataset: &Dataset, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
-        Self::interpolated(dataset, Interpolation::Linear, threshold, slope)
-    }
-
-    /// Any interpolation over `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says. `threshold` counts for `linear` alone, `slope` for all but `potential`, which takes its
-    /// mixed derivatives from the dataset's tangents where it has them.
-    ///
-    /// # Errors
-    /// As [`TorqueField::new`]; also when the dataset lacks the column that `interpolation` needs.
+    /// When the dataset is not consistent, holds numbers that are not finite, or lacks the column that `interpolation`
+    /// needs; or a parameter is out of its range.
     pub fn interpolated(
         dataset: &Dataset,
         interpolation: Interpolation,

@@ -24,7 +24,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    dataset::{Axis, Grid},
+    dataset::Grid,
     store::{Levels, Place, Root, Store, added, beyond, root},
 };
 use rayon::prelude::*;
@@ -56,7 +56,7 @@ impl<N: RootNodes> Potential<N> {
         let of_cell = |low| {
             added(nodes, 0, &low).map(|added| within(nodes, slopes, 0, &low, &Bernstein::hermite(slopes.len(), &added)))
         };
-        let cells = (0..nodes.base().points()).into_par_iter().filter_map(|point| cell(nodes.base(), point));
+        let cells = (0..nodes.base().points()).into_par_iter().filter_map(|point| nodes.base().cell_from(point));
         cells.filter_map(of_cell).reduce(Stiffness::default, Stiffness::max)
     }
 }
@@ -82,13 +82,6 @@ impl RootNodes for Store {
         let index = f64::from(u8::from(root.value > 0.0));
         Around { fade: self.base().fade(q), share: 1.0, flags, index, contact_nodes: 0 }
     }
-}
-
-/// The cell of `grid` whose first corner is `point`, if there is one; an axis of one point is a cell without extent.
-fn cell(grid: &Grid, point: usize) -> Option<Place> {
-    let low = grid.lines(point);
-    let is_first = |(axis, line): (&Axis, &usize)| line + 1 < axis.count || axis.count == 1;
-    grid.axes.iter().zip(&low).all(is_first).then(|| low.map(|line| line as u32))
 }
 
 /// Returns the greatest bound within the cell of `level` with first corner `low`, in which the levels up to this one

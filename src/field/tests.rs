@@ -5,14 +5,17 @@ use crate::field::synthetic::{grid, half_space};
 use crate::{
     MAX_JOINTS,
     contact::Status,
+    dataset::Provenance,
     joint_matrix::{JointMatrix, add_symmetric},
+    store::{Nodes, Place, Space, root_of},
 };
+use std::collections::BTreeSet;
 
 /// So steep a layer that it holds nothing back.
 const SOFT: f64 = 1e6;
 
 fn rendered(data: &Dataset, slope: f64) -> TorqueField {
-    TorqueField::new(data, 0.5, &vector(&vec![slope; data.grid.joints()])).unwrap()
+    TorqueField::interpolated(data, Interpolation::Linear, 0.5, &vector(&vec![slope; data.grid.joints()])).unwrap()
 }
 
 fn vector(values: &[f64]) -> JointVector {
@@ -207,7 +210,9 @@ fn unconverged_points_are_used_and_flagged() {
 #[test]
 fn inconsistent_datasets_are_refused_with_the_reason() {
     let good = || half_space(grid(&[(-1.0, 0.5, 5), (-1.0, 0.5, 3)]), 2.0);
-    let new = |data: Dataset, threshold: f64, slope: &[f64]| TorqueField::new(&data, threshold, &vector(slope)).err();
+    let new = |data: Dataset, threshold: f64, slope: &[f64]| {
+        TorqueField::interpolated(&data, Interpolation::Linear, threshold, &vector(slope)).err()
+    };
     assert_eq!(new(good(), 0.5, &[1.0, 2.0]), None);
     assert!(matches!(new(good(), 1.0, &[1.0, 2.0]), Some(FieldError::Threshold(_))));
     assert!(matches!(new(good(), f64::NAN, &[1.0, 2.0]), Some(FieldError::Threshold(_))));
@@ -526,5 +531,65 @@ fn tangents_make_a_potential_more_accurate_than_differences() {
         let with = error(&data);
         // Measured: 0.21, 0.48, 0.26, 0.28 and 0.35.
         assert!(with < 0.6 * without, "{joints} joints, {count} lines: {with} with tangents, {without} without");
+    }
+}
+
+#[test]
+fn a_store_of_one_level_is_the_grid_of_its_nodes() {
+    for (joints, count) in [(1, 9), (2, 6), (3, 5), (4, 4), (6, 2)] {
+        // In contact everywhere: free points are continued in two ways.
+        let deep = |q: &[f64]| {
+            let (w, slope, second) = wavy_root(q);
+            (w + 2.0, slope, second)
+        };
+        let mut data = Dataset::of_field(grid(&vec![(-0.401, 0.8 / (count - 1) as f64, count); joints]), |q| {
+            let (w, mut tau, _) = deep(q);
+            tau.iter_mut().for_each(|slope| *slope *= -w);
+            (tau, 0.5 * w * w, Status::Contact)
+        });
+        let tangent = |point: usize| -> Vec<f64> {
+            let (w, slope, second) = deep(&data.grid.configuration(point));
+            let entry = |(a, b): (usize, usize)| -slope[a] * slope[b] - w * second[a][b];
+            (0..joints).flat_map(|a| (0..=a).map(move |b| (a, b))).map(entry).collect()
+        };
+        let tangents: Vec<Vec<f64>> = (0..data.grid.points()).map(tangent).collect();
+        let space = Space::new(&data.grid, 1).unwrap();
+        let store = Store::new(space.clone(), data.grid.points());
+        let blocks: BTreeSet<Place> = space.base_nodes().map(|node| space.block_of(&node)).collect();
+        for block in blocks {
+            let mut nodes = Nodes::default();
+            for (place, node) in space.nodes(0, &block) {
+                let point = data.grid.point(node.map(|line| line as usize));
+                let energy = data.energy.as_ref().unwrap()[point];
+                let record = root_of(energy, data.torque(point), Some(&tangents[point]));
+                nodes.push(place, &record.iter().map(|x| *x as f32).collect::<Vec<_>>(), 0.0, Status::Contact);
+            }
+            store.publish(0, &block, nodes).unwrap();
+        }
+        let base = data.grid.clone();
+        let stored = Dataset::refined(Arc::new(store), base, None, String::new(), Provenance::default());
+        data.tangent = Some(tangents.concat().into_iter().map(|x| x as f32).collect::<Vec<_>>().into());
+        let [dense, stored] = [&data, &stored].map(|data| field_of(data, Interpolation::Potential));
+        let slopes = vector(&vec![1.5; joints]);
+        let [a, b] = [&dense, &stored].map(|field| field.relative_stiffness(&slopes));
+        // Numbers of the store are f32: w, below four, is rounded by so much, its derivatives over a cell by six times
+        // as much at most for each step, along each joint.
+        let rounding = 4.0 * f64::from(f32::EPSILON) * joints as f64;
+        let rate = 6.0 / (data.grid.axes[0].step);
+        assert!((a - b).abs() < 4.0 * rate * rate * rounding, "{joints} joints: {a} and {b}");
+        for k in 0..200 {
+            let q = place(joints, k);
+            let (a, b) = (dense.sample(&q), stored.sample(&q));
+            let apart = a.torque.iter().zip(b.torque.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let energies = (a.energy - b.energy).abs();
+            assert!(
+                apart < 4.0 * rate * rounding && energies < 4.0 * rounding,
+                "{joints} joints at {q:?}: {apart}, {energies}"
+            );
+            assert!(
+                (a.index - b.index).abs() < 1e-14 && (a.contact, a.flags) == (b.contact, b.flags),
+                "{a:?} and {b:?}"
+            );
+        }
     }
 }

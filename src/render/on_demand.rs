@@ -191,16 +191,20 @@ impl OnDemand {
     }
 
     /// Begins to solve around `start` and wherever the loop then goes that has the [`Live`]. Returns once the levels
-    /// around `start` are there, after 1.5 s at the latest.
+    /// around `start` are there, after 1.5 s at the latest. The equilibrium at the proxy is solved, too, where the loop
+    /// has that for its `interpolation`.
     ///
     /// # Errors
     /// When the model cannot be made, or the system gives no threads.
-    pub fn begin(self: &Arc<Self>, start: &JointVector) -> Result<(Live, Exploration), OnDemandError> {
+    pub fn begin(
+        self: &Arc<Self>,
+        start: &JointVector,
+        interpolation: Interpolation,
+    ) -> Result<(Live, Exploration), OnDemandError> {
         let began = Instant::now();
-        let haptics = &self.scene.haptics;
         let followed = Followed {
-            torque: haptics.interpolation == Interpolation::Direct,
-            forces: haptics.at_contacts().is_some(),
+            torque: interpolation == Interpolation::Direct,
+            forces: self.scene.haptics.at_contacts().is_some(),
         };
         let levels = self.store.space().levels();
         let (live, ends) = Live::new(start, levels, &self.levers(), self.threads, followed);

@@ -17,7 +17,7 @@ use crate::{
     field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError, THRESHOLD},
+    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, ProxyInertia, Rendering, SceneError, THRESHOLD, lever},
 };
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -182,7 +182,6 @@ pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<
     let (scene, threshold, slope);
     if dataset.scene.trim().is_empty() {
         let mut slopes = JointVector::zeros(dataset.grid.joints());
-        let lever = |unit: &str| if unit == "m" { LEVER_ARM } else { 1.0 };
         let axes = slopes.iter_mut().zip(&dataset.grid.axes);
         axes.for_each(|(slope, axis)| *slope = BOUNDARY_SLOPE / lever(&axis.unit).powi(2));
         (scene, threshold, slope) = (Interpolation::Linear, THRESHOLD, slopes);
@@ -287,7 +286,10 @@ mod tests {
         let mut data = half_space(grid(&[(-0.6, 0.1, 13), (-0.06, 0.01, 13)]), 5.0);
         data.grid.axes[1].unit = "m".into();
         let slopes = JointVector::from_slice(&[BOUNDARY_SLOPE, 100.0 * BOUNDARY_SLOPE]);
-        let (found, expected) = (field(&data, None).unwrap(), TorqueField::new(&data, THRESHOLD, &slopes).unwrap());
+        let (found, expected) = (
+            field(&data, None).unwrap(),
+            TorqueField::interpolated(&data, Interpolation::Linear, THRESHOLD, &slopes).unwrap(),
+        );
         assert_eq!(found.sample(&[0.33, 0.033]), expected.sample(&[0.33, 0.033]));
         assert!(found.sample(&[0.33, 0.033]).contact);
         assert!(field(&data, Some(Interpolation::Potential)).unwrap().is_potential());

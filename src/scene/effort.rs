@@ -29,6 +29,13 @@ pub fn effort_norms<'a>([torque, force]: [f64; 2], units: impl IntoIterator<Item
     }
 }
 
+/// The factor of the torque of a joint with coordinates in `unit` in a norm over joints: [`LEVER_ARM`] for the force of
+/// a sliding one (m), else 1.
+#[must_use]
+pub fn lever(unit: &str) -> f64 {
+    if unit == "m" { LEVER_ARM } else { 1.0 }
+}
+
 /// The arm with which the forces of sliding joints count in a norm of torques over joints with coordinates in `units`
 /// (m); absent where no joint slides.
 #[must_use]

@@ -64,10 +64,15 @@ impl Sweep<'_> {
     /// # Errors
     /// Those of the backend.
     pub fn predict<B: Backend>(&mut self, backend: &mut B, is_timed: bool) -> Result<(), B::Error> {
-        let points = self.grid.points();
-        if points < FEWEST_POINTS {
-            return Ok(());
+        if self.grid.points() >= FEWEST_POINTS {
+            self.forecast = Some(self.sampled(backend, is_timed)?);
         }
+        Ok(())
+    }
+
+    /// What follows from a sample of the points, however few there are.
+    pub(super) fn sampled<B: Backend>(&self, backend: &mut B, is_timed: bool) -> Result<Forecast, B::Error> {
+        let points = self.grid.points();
         let mut random = Random::new(SEED);
         let most = DRAWN.min(points);
         let free_space = self.free_space();
@@ -103,13 +108,12 @@ impl Sweep<'_> {
                 .map(|(rows, is_stored)| if is_stored { (per_sample * rows as f64).round() as usize } else { 0 });
             columns::size(points, shape.width(), contacts, touches)
         };
-        self.forecast = Some(Forecast {
+        Ok(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,
             seconds: is_timed.then_some(seconds),
             disk: bytes(Shape { with_forces: self.with_forces, ..self.shape }),
             part: bytes(self.shape),
             sampled,
-        });
-        Ok(())
+        })
     }
 }

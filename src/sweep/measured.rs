@@ -3,7 +3,7 @@
 //!
 //! The configurations are spread evenly over the cells of the grid that have a corner in contact, the same ones every
 //! time. Each is solved as a grid point is, from rest, and from those corners of its cell that predict a lower energy
-//! (`lowest.rs`). Errors are Euclidean norms over the joints; a prismatic joint counts with [`LEVER_ARM`].
+//! (`lowest.rs`). Errors are Euclidean norms over the joints; the force of a sliding joint counts with its lever arm.
 //!
 //! The same configurations tell whether the arm pushes through a part of the object within a cell.
 //!
@@ -12,6 +12,7 @@
 
 use super::{
     lowest,
+    reference::{Reference, TorqueNorm},
     table::{PointResult, Table},
     thin_parts,
 };
@@ -21,7 +22,7 @@ use crate::{
     dataset::{Dataset, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
-    scene::{Interpolation, LEVER_ARM, lever_arm},
+    scene::Interpolation,
 };
 use rayon::prelude::*;
 use std::{
@@ -113,33 +114,20 @@ impl ErrorCheck<'_> {
                 })
                 .map(|corner| table.forces(corner));
             let lowest = lowest::lower(solver, &place.q, Some(&known), promising).unwrap_or(from_rest);
-            Some((!lowest.status.is_failed()).then_some(lowest.torque))
+            Some(lowest)
         });
         let Some(solved) = solved.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
-        let exact: Vec<(&Place, JointVector)> =
-            places.iter().zip(solved).filter_map(|(place, torque)| Some((place, torque?))).collect();
-        let size = |tau: &[f64]| {
-            let lever = |unit: &str| if unit == "m" { LEVER_ARM } else { 1.0 };
-            tau.iter().zip(&grid.axes).map(|(tau, axis)| (lever(&axis.unit) * tau).powi(2)).sum::<f64>().sqrt()
-        };
+        let kept: Vec<&Place> =
+            places.iter().zip(&solved).filter(|(_, found)| !found.status.is_failed()).map(|(place, _)| place).collect();
+        let norm = TorqueNorm::new(grid.axes.iter().map(|axis| axis.unit.as_str()));
+        let reference = Reference::of(norm, places.iter().map(|place| place.q).zip(solved));
         let errors = Interpolation::ALL.into_par_iter().map(|interpolation| {
-            let found = interpolated(grid, table, &exact, (interpolation, self.threshold, &self.slope), WHOLE)?;
-            let errors = found.iter().zip(&exact).map(|(found, (_, exact))| {
-                let mut error = *found;
-                error.iter_mut().zip(exact.iter()).for_each(|(error, exact)| *error -= exact);
-                size(&error)
-            });
-            Ok(InterpolationError::of(interpolation.name(), errors.collect()))
+            let of = (interpolation, self.threshold, &self.slope);
+            let mut found = interpolated(grid, table, &kept, of, WHOLE)?.into_iter();
+            let errors = reference.distances(|q| found.next().unwrap_or(*q));
+            Ok(InterpolationError::of(interpolation.name(), errors))
         });
-        let squares: f64 = exact.iter().map(|(_, tau)| size(tau).powi(2)).sum();
-        let error = MeasuredError {
-            configurations: exact.len(),
-            left_out: places.len() - exact.len(),
-            interpolation: self.interpolation.name().to_owned(),
-            lever_arm: lever_arm(grid.axes.iter().map(|axis| axis.unit.as_str())),
-            torque: (squares / exact.len().max(1) as f64).sqrt(),
-            errors: errors.collect::<Result<_, FieldError>>()?,
-        };
+        let error = reference.measured(self.interpolation, errors.collect::<Result<_, FieldError>>()?);
         let cells = places.par_iter().map(|place| {
             let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
             (place.q, corners.collect())
@@ -153,7 +141,7 @@ impl ErrorCheck<'_> {
 fn interpolated(
     grid: &Grid,
     table: &Table<'_>,
-    places: &[(&Place, JointVector)],
+    places: &[&Place],
     (interpolation, threshold, slope): (Interpolation, f64, &JointVector),
     whole: usize,
 ) -> Result<Vec<JointVector>, FieldError> {
@@ -163,12 +151,12 @@ fn interpolated(
     if grid.points() <= whole {
         let all: Vec<_> = grid.counts().into_iter().map(|count| 0..count).collect();
         let field = field(&all)?;
-        return Ok(places.par_iter().map(|(place, _)| field.sample(&place.q).torque).collect());
+        return Ok(places.par_iter().map(|place| field.sample(&place.q).torque).collect());
     }
     // As many lines on either side as there is room for, at least the next: differences reach so far.
     let side = (AROUND as f64).powf(1.0 / grid.joints() as f64) as usize;
     let reach = (side.max(4) - 2) / 2;
-    let around = |(place, _): &(&Place, JointVector)| {
+    let around = |place: &&Place| {
         let lines = place.cell.iter().zip(&grid.axes);
         let lines: Vec<_> =
             lines.map(|(line, axis)| line.saturating_sub(reach)..(line + 2 + reach).min(axis.count)).collect();
@@ -364,10 +352,10 @@ mod tests {
         let columns = columns(&grid);
         let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         let places = places(&grid, &table, 54 * 80, 50, DRAWS);
-        let exact: Vec<_> = places.iter().map(|place| (place, JointVector::zeros(2))).collect();
+        let places: Vec<&Place> = places.iter().collect();
         let slope = JointVector::from_slice(&[1e3, 1e3]);
         for interpolation in Interpolation::ALL {
-            let of = |whole: usize| interpolated(&grid, &table, &exact, (interpolation, 0.5, &slope), whole).unwrap();
+            let of = |whole: usize| interpolated(&grid, &table, &places, (interpolation, 0.5, &slope), whole).unwrap();
             for (a, b) in of(usize::MAX).iter().zip(&of(0)) {
                 let apart = a.iter().zip(b.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(apart < 1e-12, "{interpolation:?}: {a:?} and {b:?}");

@@ -11,7 +11,7 @@
 use super::{
     BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep, build_object,
     grid_sweep::check_given,
-    reference::{Reference, ReferenceError, equilibria},
+    reference::{Reference, ReferenceError},
     sample, spacing,
 };
 use crate::{
@@ -257,7 +257,7 @@ impl Pilot {
             aim,
             relative: aim / torque,
             torque,
-            lever_arm: reference.lever_arm,
+            lever_arm: reference.norm.lever_arm,
             configurations: reference.exact.len(),
             in_contact: reference.in_contact,
             prospects: prospects(&trials, SPACING_SHARE * aim, joints),
@@ -384,9 +384,7 @@ fn prospects(trials: &[Trial], aim: f64, joints: usize) -> Vec<Prospect> {
 fn tolerance(scene: &Scene, model: &Model<'_>, reference: &Reference, error: f64) -> Result<f64, PilotError> {
     for tolerance in TOLERANCES {
         let contact = ContactSpec { tolerance, ..scene.contact };
-        let found = equilibria(model, contact, &reference.places).map_err(ReferenceError::from)?;
-        let mut torques = found.iter().map(|equilibrium| equilibrium.torque);
-        if reference.errors(|q| torques.next().unwrap_or(*q)).0 <= error {
+        if reference.error_of(model, contact).map_err(ReferenceError::from)? <= error {
             return Ok(tolerance);
         }
     }

@@ -1,24 +1,15 @@
 //! The cost of each shard of a bake, before anything is baked.
 //!
-//! Which points are skipped is found out for the whole grid, as each shard does. The time of the others follows from a
-//! sample, solved on this machine.
+//! Which points are skipped is found out for the whole grid, as each shard does. The time of the others is shared out
+//! from the forecast of the whole sweep (`forecast.rs`).
 
-use super::{Backend, BackendChoice, Bake, BakeError, ChosenBackend, Forecast, Run, Shard, Sweep};
-use crate::{JointVector, memory, scene::Scene};
+use super::{BackendChoice, Bake, BakeError, ChosenBackend, Forecast, Shard};
+use crate::{memory, scene::Scene};
 use serde::Serialize;
 use std::{sync::atomic::AtomicBool, time::Instant};
 
 /// Memory over that of the planning process and of the largest chunk (1): allocators keep some of what was freed.
 const MEMORY_MARGIN: f64 = 1.25;
-
-/// Points that are solved to know the time of one, at most (1).
-const SAMPLE: usize = 512;
-
-/// Points among them that are solved at once (1).
-const PORTION: usize = 64;
-
-/// Time after which no more of them are solved (s).
-const LONGEST: f64 = 1.0;
 
 /// Expected cost of a shard.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -48,8 +39,8 @@ pub struct Plan {
     pub backend: &'static str,
     /// Setting up, which each shard repeats: object, compliance, and proving points free (s).
     pub setup: f64,
-    /// The sample; absent where the grid is too small.
-    pub forecast: Option<Forecast>,
+    /// The whole sweep, from a sample.
+    pub forecast: Forecast,
     /// Memory of a process, shard or merge (bytes).
     pub memory: usize,
     /// The dataset. Merging takes twice as much disk beside the shards, for a moment (bytes).
@@ -68,53 +59,34 @@ impl Plan {
         let bake = Bake { scene, backend, measured: Some(0), aim: None, date: "", stop, progress: &mut |_| () };
         bake.prepared(|sweep, backend, run| {
             sweep.shard = Shard { index: 0, count };
-            let (solved, sample) = sweep.solved_of_shards(count, SAMPLE)?;
+            let solved = sweep.solved_of_shards(count)?;
             let setup = start.elapsed().as_secs_f64();
+            sweep.shard = Shard::WHOLE;
             // A GPU's time for few points says nothing of many.
             let is_timed = matches!(backend, ChosenBackend::Cpu(_));
-            let each = if is_timed { timed(sweep, backend, &sample)? } else { None };
-            sweep.shard = Shard::WHOLE;
-            sweep.predict(backend, false)?;
-            Ok(Self::of(sweep, backend, &run, &solved, (setup, each)))
+            let forecast = sweep.forecast.map_or_else(|| sweep.sampled(backend, is_timed), Ok)?;
+            sweep.shard = Shard { index: 0, count };
+            let largest = sweep.footprint(run.chunk, false);
+            let (points, all) = (sweep.grid().points(), solved.iter().sum::<usize>());
+            let cost = |(index, &solved): (usize, &usize)| {
+                let own = Shard { index, count }.points(points);
+                let bytes = (forecast.part as f64 * own as f64 / points as f64).round() as usize;
+                let share = solved as f64 / all.max(1) as f64;
+                let seconds = forecast.seconds.map(|seconds| setup + seconds * share);
+                ShardCost { shard: index, points: own, solved, seconds, bytes }
+            };
+            Ok(Self {
+                points,
+                solved: all,
+                threads: rayon::current_num_threads(),
+                backend: backend.name(),
+                setup,
+                forecast,
+                memory: (MEMORY_MARGIN * (memory::greatest().unwrap_or(0) + largest.memory.most) as f64) as usize,
+                dataset: forecast.disk,
+                shards: solved.iter().enumerate().map(cost).collect(),
+            })
         })
-    }
-
-    /// `setup`: that time, and the time of each solved point where it is known (s).
-    fn of(
-        sweep: &mut Sweep<'_>,
-        backend: &ChosenBackend<'_>,
-        run: &Run<'_>,
-        solved: &[usize],
-        (setup, each): (f64, Option<f64>),
-    ) -> Self {
-        let points = sweep.grid().points();
-        let of_whole = |bytes: usize, part: usize| (bytes as f64 * part as f64 / points as f64).round() as usize;
-        let all: usize = solved.iter().sum();
-        let forecast = sweep.forecast;
-        let dataset = forecast.map_or(sweep.footprint(run.chunk, false).disk.most, |forecast| forecast.disk);
-        let stored = forecast.map_or(0, |forecast| forecast.part);
-        sweep.shard = Shard { index: 0, count: solved.len() };
-        let largest = sweep.footprint(run.chunk, false);
-        let shards = solved.iter().enumerate().map(|(index, &solved_points)| {
-            let shard = Shard { index, count: solved.len() };
-            let own = shard.points(points);
-            let seconds = each.map(|each| setup + each * solved_points as f64);
-            let bytes = if stored > 0 { of_whole(stored, own) } else { largest.disk.most };
-            ShardCost { shard: index, points: own, solved: solved_points, seconds, bytes }
-        });
-        let shards = shards.collect();
-        let own = memory::greatest().unwrap_or(0);
-        Self {
-            points,
-            solved: all,
-            threads: rayon::current_num_threads(),
-            backend: backend.name(),
-            setup,
-            forecast,
-            memory: (MEMORY_MARGIN * (own + largest.memory.most) as f64) as usize,
-            dataset,
-            shards,
-        }
     }
 
     /// Total time of all shards, one after the other, where it is known (s).
@@ -128,18 +100,4 @@ impl Plan {
     pub fn longest(&self) -> Option<f64> {
         self.shards.iter().filter_map(|shard| shard.seconds).max_by(f64::total_cmp)
     }
-}
-
-/// Time of each of the points `sample`, solved by `backend`; `None` where there are none (s).
-fn timed(sweep: &Sweep<'_>, backend: &mut ChosenBackend<'_>, sample: &[usize]) -> Result<Option<f64>, BakeError> {
-    let (start, mut solved) = (Instant::now(), 0);
-    for portion in sample.chunks(PORTION) {
-        let configurations: Vec<JointVector> = portion.iter().map(|&point| sweep.grid().configuration(point)).collect();
-        backend.solve(&configurations)?;
-        solved += portion.len();
-        if start.elapsed().as_secs_f64() > LONGEST {
-            break;
-        }
-    }
-    Ok((solved > 0).then(|| start.elapsed().as_secs_f64() / solved as f64))
 }

@@ -1,11 +1,12 @@
-//! Directly solved random configurations, and the distance of other answers from them.
+//! Directly solved configurations, each solved once, and the distance of other answers from them.
 
 use super::{Backend, BackendError, CpuBackend, table::PointResult};
 use crate::{
     JointVector,
     contact::{Equilibrium, Model, Status},
+    dataset::{InterpolationError, MeasuredError},
     random::Random,
-    scene::{Algorithm, ContactSpec, JointKind, LEVER_ARM, Scene, lever_arm},
+    scene::{Algorithm, ContactSpec, Interpolation, Scene, lever, lever_arm},
 };
 
 /// Relative residual to which the reference of an accuracy study is solved (1): three decades below the scenes' own
@@ -16,7 +17,29 @@ pub const REFERENCE_TOLERANCE: f64 = 1e-11;
 /// seen.
 const MOST_DRAWN: usize = 1 << 16;
 
-/// Random configurations and their torques.
+/// The norm of torques over the joints, forces of sliding joints times their lever arm.
+#[derive(Clone, Copy)]
+pub(crate) struct TorqueNorm {
+    levers: JointVector,
+    /// As in [`MeasuredError::lever_arm`] (m).
+    pub lever_arm: Option<f64>,
+}
+
+impl TorqueNorm {
+    /// The norm over joints with coordinates in `units`.
+    pub fn new<'a>(units: impl Iterator<Item = &'a str> + Clone) -> Self {
+        let levers: Vec<f64> = units.clone().map(lever).collect();
+        Self { levers: JointVector::from_slice(&levers), lever_arm: lever_arm(units) }
+    }
+
+    /// Squared distance of two torques (N^2 m^2).
+    pub fn square(&self, a: &JointVector, b: &JointVector) -> f64 {
+        let parts = a.iter().zip(b.iter()).zip(self.levers.iter());
+        parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum()
+    }
+}
+
+/// Configurations and their torques, each solved once.
 pub(crate) struct Reference {
     /// Configurations (rad or m).
     pub places: Vec<JointVector>,
@@ -26,15 +49,11 @@ pub(crate) struct Reference {
     energies: Vec<f64>,
     pub in_contact: usize,
     pub left_out: usize,
-    /// Mean number of the object's nodes with a contact force (1).
-    pub mean_forces: f64,
+    /// Forces on the object's nodes, of all configurations.
+    forces: usize,
     /// rms of the torque (N m).
     pub torque: f64,
-    /// rms of its own error (N m).
-    pub error: f64,
-    levers: JointVector,
-    /// As in [`MeasuredError`](crate::dataset::MeasuredError::lever_arm) (m).
-    pub lever_arm: Option<f64>,
+    pub norm: TorqueNorm,
 }
 
 /// There is nothing to compare with.
@@ -53,71 +72,96 @@ pub enum ReferenceError {
 }
 
 impl Reference {
+    /// What was `solved`; configurations that did not converge are left out.
+    pub fn of(norm: TorqueNorm, solved: impl IntoIterator<Item = (JointVector, Equilibrium)>) -> Self {
+        let (places, exact, energies) = (Vec::new(), Vec::new(), Vec::new());
+        let mut reference = Self { places, exact, energies, in_contact: 0, left_out: 0, forces: 0, torque: 0.0, norm };
+        reference.extend(solved);
+        reference
+    }
+
+    fn extend(&mut self, solved: impl IntoIterator<Item = (JointVector, Equilibrium)>) {
+        for (q, equilibrium) in solved {
+            self.forces += equilibrium.forces.len();
+            if equilibrium.status.is_failed() {
+                self.left_out += 1;
+                continue;
+            }
+            self.in_contact += usize::from(equilibrium.status == Status::Contact);
+            self.places.push(q);
+            self.exact.push(equilibrium.torque);
+            self.energies.push(equilibrium.energy);
+        }
+        self.settle();
+    }
+
+    /// Takes the rms of the torque anew.
+    fn settle(&mut self) {
+        let zero = JointVector::zeros(self.norm.levers.len());
+        self.torque = self.errors(|_| zero).0;
+    }
+
     /// Solves `count` random configurations within the grid of `scene`, the same ones every time for the same `seed`.
     pub fn solve(scene: &Scene, model: &Model<'_>, seed: u64, count: usize) -> Result<Self, ReferenceError> {
+        Self::drawn(scene, model, seed, count, 0)
+    }
+
+    /// As [`Reference::solve`], with twice as many configurations again and again until `contacts` of them are in
+    /// contact, or no more are drawn.
+    pub fn in_contact(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
+        Self::drawn(scene, model, seed, 2 * contacts, contacts)
+    }
+
+    fn drawn(
+        scene: &Scene,
+        model: &Model<'_>,
+        seed: u64,
+        mut count: usize,
+        contacts: usize,
+    ) -> Result<Self, ReferenceError> {
+        let model = model.with_contact(tight(scene.contact, REFERENCE_TOLERANCE));
+        let mut backend = CpuBackend::new(&model, 0).map_err(BackendError::from)?;
         let mut random = Random::new(seed);
-        let place = |_| {
+        let mut reference = Self::of(TorqueNorm::new(scene.proxy.joints.iter().map(|joint| joint.kind.unit())), []);
+        let mut place = |_| {
             let mut q = JointVector::zeros(scene.grid.axes.len());
             for (q, axis) in q.iter_mut().zip(&scene.grid.axes) {
                 *q = axis.start + random.between(0.0, 1.0) * axis.step * (axis.count - 1) as f64;
             }
             q
         };
-        let drawn: Vec<JointVector> = (0..count).map(place).collect();
-        let converged = equilibria(model, tight(scene.contact, REFERENCE_TOLERANCE), &drawn)?;
-        let rougher = equilibria(model, tight(scene.contact, 100.0 * REFERENCE_TOLERANCE), &drawn)?;
-        let mut levers = JointVector::zeros(model.chain.joints.len());
-        levers.iter_mut().zip(&scene.proxy.joints).for_each(|(lever, joint)| {
-            *lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
-        });
-        let forces: usize = converged.iter().map(|equilibrium| equilibrium.forces.len()).sum();
-        let mut reference = Self {
-            places: Vec::new(),
-            exact: Vec::new(),
-            energies: Vec::new(),
-            in_contact: 0,
-            left_out: 0,
-            mean_forces: forces as f64 / count.max(1) as f64,
-            torque: 0.0,
-            error: 0.0,
-            levers,
-            lever_arm: lever_arm(scene.proxy.joints.iter().map(|joint| joint.kind.unit())),
-        };
-        let mut rough = Vec::new();
-        for ((q, equilibrium), other) in drawn.into_iter().zip(converged).zip(rougher) {
-            match equilibrium.status {
-                Status::Free | Status::Contact => {
-                    reference.in_contact += usize::from(equilibrium.status == Status::Contact);
-                    reference.places.push(q);
-                    reference.exact.push(equilibrium.torque);
-                    reference.energies.push(equilibrium.energy);
-                    rough.push(other.torque);
-                }
-                _ => reference.left_out += 1,
+        loop {
+            let places: Vec<JointVector> = (reference.solved()..count).map(&mut place).collect();
+            let solved = backend.solve(&places).unwrap_or_else(|never| match never {});
+            reference.extend(places.into_iter().zip(solved));
+            if reference.in_contact >= contacts || count >= MOST_DRAWN {
+                break;
             }
+            count *= 2;
         }
-        if reference.in_contact == 0 {
-            return Err(ReferenceError::NoContact(count));
-        }
-        let zero = JointVector::zeros(reference.levers.len());
-        reference.torque = reference.errors(|_| zero).0;
-        let mut rough = rough.into_iter();
-        reference.error = reference.errors(|_| rough.next().unwrap_or(zero)).0;
-        Ok(reference)
+        if reference.in_contact == 0 { Err(ReferenceError::NoContact(count)) } else { Ok(reference) }
     }
 
-    /// As [`Reference::solve`], with twice as many configurations again and again until `contacts` of them are in
-    /// contact, or no more are drawn.
-    pub fn in_contact(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
-        let mut count = contacts;
-        loop {
-            count *= 2;
-            match Self::solve(scene, model, seed, count) {
-                Ok(reference) if reference.in_contact >= contacts || count >= MOST_DRAWN => return Ok(reference),
-                Err(ReferenceError::NoContact(_)) | Ok(_) if count < MOST_DRAWN => (),
-                otherwise => return otherwise,
-            }
-        }
+    /// Number of configurations that were solved.
+    pub fn solved(&self) -> usize {
+        self.places.len() + self.left_out
+    }
+
+    /// Mean number of the object's nodes with a contact force (1).
+    pub fn mean_forces(&self) -> f64 {
+        self.forces as f64 / self.solved().max(1) as f64
+    }
+
+    /// Its own error, rms: distance of the same configurations solved a hundred times as roughly (N m).
+    pub fn own_error(&self, scene: &Scene, model: &Model<'_>) -> Result<f64, BackendError> {
+        self.error_of(model, tight(scene.contact, 100.0 * REFERENCE_TOLERANCE))
+    }
+
+    /// Rms distance of the same configurations solved as `contact` says (N m).
+    pub fn error_of(&self, model: &Model<'_>, contact: ContactSpec) -> Result<f64, BackendError> {
+        let solved = equilibria(model, contact, &self.places)?;
+        let mut torques = solved.iter().map(|equilibrium| equilibrium.torque);
+        Ok(self.errors(|q| torques.next().unwrap_or(*q)).0)
     }
 
     /// The same configurations with other torques.
@@ -136,8 +180,19 @@ impl Reference {
     /// Replaces the equilibrium at place number `k`.
     pub(super) fn replace(&mut self, k: usize, equilibrium: &Equilibrium) {
         (self.exact[k], self.energies[k]) = (equilibrium.torque, equilibrium.energy);
-        let zero = JointVector::zeros(self.levers.len());
-        self.torque = self.errors(|_| zero).0;
+        self.settle();
+    }
+
+    /// What is told of a dataset whose own `interpolation` and others have `errors` here.
+    pub fn measured(&self, interpolation: Interpolation, errors: Vec<InterpolationError>) -> MeasuredError {
+        MeasuredError {
+            configurations: self.places.len(),
+            left_out: self.left_out,
+            torque: self.torque,
+            lever_arm: self.norm.lever_arm,
+            interpolation: interpolation.name().to_owned(),
+            errors,
+        }
     }
 
     /// Mean of the squared distance of the torque that `answer` gives at each place from the exact one, and the
@@ -164,11 +219,7 @@ impl Reference {
 
     /// Squared distances of the torque that `answer` gives at each place from the exact one (N^2 m^2).
     fn squares(&self, mut answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
-        let square = |(q, exact): (&JointVector, &JointVector)| {
-            let answered = answer(q);
-            let parts = answered.iter().zip(exact.iter()).zip(self.levers.iter());
-            parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum()
-        };
+        let square = |(q, exact): (&JointVector, &JointVector)| self.norm.square(&answer(q), exact);
         self.places.iter().zip(&self.exact).map(square).collect()
     }
 }
@@ -189,4 +240,30 @@ pub(crate) fn equilibria(
     let model = model.with_contact(contact);
     let mut backend = CpuBackend::new(&model, 0)?;
     Ok(backend.solve(places).unwrap_or_else(|never| match never {}))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        proxy::Chain,
+        sweep::{build_object, sample},
+    };
+
+    #[test]
+    fn configurations_drawn_until_enough_touch_are_those_drawn_at_once() {
+        let scene = Scene::parse(include_str!("../../tests/scenes/small.toml"), "small.toml").unwrap();
+        let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
+        let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
+        let grown = Reference::in_contact(&scene, &model, 5, 24).unwrap();
+        // More than the first draw, and no more than is needed.
+        assert!(grown.solved() > 48 && grown.in_contact >= 24, "{} of {}", grown.in_contact, grown.solved());
+        let at_once = Reference::solve(&scene, &model, 5, grown.solved()).unwrap();
+        assert_eq!((&grown.places, &grown.exact), (&at_once.places, &at_once.exact));
+        assert_eq!((grown.in_contact, grown.torque), (at_once.in_contact, at_once.torque));
+        assert_eq!(grown.mean_forces(), at_once.mean_forces());
+        assert!(Reference::solve(&scene, &model, 5, grown.solved() / 2).unwrap().in_contact < 24);
+        let own = grown.own_error(&scene, &model).unwrap();
+        assert!(own > 0.0 && own < 1e-6 * grown.torque, "{own} of {}", grown.torque);
+    }
 }

@@ -1,40 +1,26 @@
 //! The sweep of one shard, into a file of its own, and what all shards will take.
 
 use super::{Backend, Run, Shard, Sweep, SweepError, SweepReport, chunks::Begun, merge::Contents, part::Part};
-use crate::random::Random;
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Seed of the sample of points.
-const SEED: u64 = 0x2545_f491_4f6c_dd1d;
-
 impl Sweep<'_> {
-    /// Number of points that are not skipped, of each of `count` shards, and a random sample of at most `most` of these
-    /// points.
-    pub(super) fn solved_of_shards(&self, count: usize, most: usize) -> Result<(Vec<usize>, Vec<usize>), SweepError> {
+    /// Number of points that are not skipped, of each of `count` shards.
+    pub(super) fn solved_of_shards(&self, count: usize) -> Result<Vec<usize>, SweepError> {
         let (points, any) = (self.grid.points(), Shard { index: 0, count });
         let (mut solved, mut done) = (vec![0; count], 0);
-        let (mut sample, mut met, mut random) = (Vec::new(), 0_usize, Random::new(SEED));
         let free_space = self.free_space();
         while done < points {
             let slab = free_space.as_ref().map_or(0..points, |free_space| free_space.slab(done));
             let gaps = free_space.as_ref().map(|free_space| self.gaps(free_space, slab.clone())).transpose()?;
             for point in slab.clone().filter(|&point| gaps.as_ref().is_none_or(|gaps| gaps.gap(point).is_none())) {
                 solved[any.having(point, points)] += 1;
-                // Each of the points so far is as likely to be in the sample as any other (Vitter 1985, algorithm R).
-                met += 1;
-                let place = random.between(0.0, met as f64) as usize;
-                if sample.len() < most {
-                    sample.push(point);
-                } else if let Some(kept) = sample.get_mut(place) {
-                    *kept = point;
-                }
             }
             done = slab.end;
         }
-        Ok((solved, sample))
+        Ok(solved)
     }
 
     /// Solves the points of `shard` into a file in `folder`, which is made where it is missing, and returns its path.

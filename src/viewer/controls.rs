@@ -10,10 +10,7 @@ use super::{
     theme::{CHOICE_WIDTH, GROUP_GAP},
     view_renderer::Quantity,
 };
-use crate::{
-    dataset::Dataset,
-    scene::{Algorithm, EFFECTS, Effect, Interpolation, Scene, Tuning},
-};
+use crate::scene::{Algorithm, EFFECTS, Effect, Interpolation, Scene, Tuning};
 use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
 use std::sync::Arc;
 
@@ -94,7 +91,7 @@ impl Controls {
         gains::legend(ui);
         gains::sliders(ui, axes, self.joint, &mut self.tuning.haptics, &self.original.haptics);
         gains::threshold(ui, &mut self.tuning.haptics);
-        self.interpolation(ui, &loaded.dataset);
+        self.interpolation(ui, loaded);
         match advice {
             Some(advice) => ui.colored_label(ui.visuals().warn_fg_color, RichText::new(advice).small()),
             None => {
@@ -105,7 +102,7 @@ impl Controls {
     }
 
     /// Shows how the torque is interpolated between grid points.
-    fn interpolation(&mut self, ui: &mut Ui, dataset: &Dataset) {
+    fn interpolation(&mut self, ui: &mut Ui, loaded: &Loaded) {
         ui.horizontal(|ui| {
             let label = ui.label("Interpolation").on_hover_text("How the torque follows from the grid points around");
             let chosen = &mut self.tuning.haptics.interpolation;
@@ -113,12 +110,12 @@ impl Controls {
                 .width(CHOICE_WIDTH)
                 .selected_text(chosen.name())
                 .show_ui(ui, |ui| {
-                    for interpolation in Interpolation::ALL {
-                        let lacking = lacking(interpolation, dataset);
+                    for interpolation in Interpolation::NAMED {
+                        let lacking = lacking(interpolation, loaded);
                         ui.add_enabled_ui(lacking.is_none(), |ui| {
                             let choice = ui.selectable_value(chosen, interpolation, interpolation.name());
-                            if let Some(column) = lacking {
-                                choice.on_disabled_hover_text(format!("This dataset holds no {column}"));
+                            if let Some(lacking) = lacking {
+                                choice.on_disabled_hover_text(lacking);
                             }
                         });
                     }
@@ -234,7 +231,11 @@ fn note(ui: &mut Ui, text: String) -> Response {
     ui.label(RichText::new(text).weak().small())
 }
 
-/// The column that `interpolation` needs and `dataset` lacks.
-fn lacking(interpolation: Interpolation, dataset: &Dataset) -> Option<&'static str> {
-    (interpolation.is_potential() && dataset.energy.is_none()).then_some("energy")
+/// What `interpolation` needs and is not `loaded`, in words.
+fn lacking(interpolation: Interpolation, loaded: &Loaded) -> Option<&'static str> {
+    match interpolation {
+        Interpolation::Direct if loaded.on_demand.is_none() => Some("Nothing is solved here: start with --on-demand"),
+        of if of.is_potential() && loaded.dataset.energy.is_none() => Some("This dataset holds no energy"),
+        _ => None,
+    }
 }

@@ -113,7 +113,7 @@ impl Feel {
             }
         };
         let is_led = input.is_some();
-        let explored = on_demand.map(|on_demand| explore(on_demand, &haptics, device.as_mut())).transpose()?;
+        let explored = on_demand.map(|on_demand| explore(on_demand, &haptics, gains, device.as_mut())).transpose()?;
         let (live, exploration) = explored.unzip();
         let guide = Arc::new(Mutex::new(guide));
         let stop = Arc::new(AtomicBool::new(false));
@@ -241,10 +241,11 @@ impl Drop for Feel {
 fn explore(
     on_demand: &Arc<OnDemand>,
     haptics: &Haptics,
+    gains: &HapticsSpec,
     device: &mut dyn Device,
 ) -> Result<(Live, Exploration), String> {
     let start = haptics.start(&device.read(0.0).position).map_err(|fault| fault.to_string())?;
-    on_demand.begin(start.proxy()).map_err(|error| error.to_string())
+    on_demand.begin(start.proxy(), gains.interpolation).map_err(|error| error.to_string())
 }
 
 fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {

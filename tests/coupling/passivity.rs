@@ -138,7 +138,8 @@ fn a_layer_and_an_object_that_keep_their_bounds_may_break_the_one_of_both_togeth
     let setup = Setup::new(&data).unwrap();
     let mut gains =
         HapticsSpec { interpolation: Interpolation::Linear, passivity_factor: 2.0, ..setup.scene.haptics.clone() };
-    let field = TorqueField::new(&data, gains.threshold, &gains.boundary_slope).unwrap();
+    let field =
+        TorqueField::interpolated(&data, Interpolation::Linear, gains.threshold, &gains.boundary_slope).unwrap();
     let value = |gains: &HapticsSpec, what: &str| {
         let bounds = passivity::bounds(gains, &field, &labels(&data.grid));
         bounds.into_iter().find(|bound| bound.what.contains(what)).unwrap().value

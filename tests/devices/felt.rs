@@ -10,7 +10,7 @@ use haptize::{
     device::{Device, Motion, SimulatedHand},
     field::TorqueField,
     render::{haptic::Haptics, session::Driver, trace::Tick},
-    scene::Waypoint,
+    scene::{Interpolation, Waypoint},
 };
 
 /// Nominal time between ticks (s).
@@ -25,7 +25,7 @@ pub fn all(joints: usize, x: f64) -> JointVector {
 pub fn half_space_loop(joints: usize) -> Haptics {
     let data = half_space(grid(&vec![(-0.6, 0.3, 5); joints]), 5.0);
     let spec = haptics(joints);
-    let field = TorqueField::new(&data, spec.threshold, &spec.boundary_slope).unwrap();
+    let field = TorqueField::interpolated(&data, Interpolation::Linear, spec.threshold, &spec.boundary_slope).unwrap();
     Haptics::new(field, proxy(joints), &spec).unwrap()
 }
 

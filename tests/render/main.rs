@@ -37,8 +37,8 @@ use haptize::{
         trace::{Frame, Tick, Trace},
     },
     scene::{
-        GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, HapticsSpec, Material, ObjectSpec, Scene, Shape,
-        SpringKind, SpringSpec, Waypoint,
+        GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, HapticsSpec, Interpolation, Material, ObjectSpec,
+        Scene, Shape, SpringKind, SpringSpec, Waypoint,
     },
     sweep::baked,
 };
@@ -59,7 +59,7 @@ fn half_space_of(joints: usize) -> Dataset {
 }
 
 fn build(data: &Dataset, spec: &HapticsSpec) -> Haptics {
-    let field = TorqueField::new(data, spec.threshold, &spec.boundary_slope).unwrap();
+    let field = TorqueField::interpolated(data, Interpolation::Linear, spec.threshold, &spec.boundary_slope).unwrap();
     Haptics::new(field, proxy(data.grid.joints()), spec).unwrap()
 }
 

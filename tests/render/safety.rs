@@ -82,7 +82,7 @@ fn a_device_that_fails_is_let_go_smoothly_with_the_reason() {
         assert_eq!(output.fault, None);
         assert!(output.torque.norm() > 0.5 && output.accounts.residual().abs() < 1e-11 * output.accounts.exchanged);
     }
-    let field = TorqueField::new(&data, 0.5, &spec.boundary_slope).unwrap();
+    let field = TorqueField::interpolated(&data, Interpolation::Linear, 0.5, &spec.boundary_slope).unwrap();
     let differing = JointsError { field: 2, proxy: 3, gains: 2 };
     assert_eq!(Haptics::new(field, proxy(3), &spec).err(), Some(differing));
     assert_eq!(haptics.start(&all(2, f64::NAN)).err(), Some(Fault::NotFinite));
@@ -108,7 +108,9 @@ fn a_torque_that_is_no_number_never_reaches_the_device() {
 #[test]
 fn gains_beyond_their_bound_are_named_with_the_safe_value() {
     let (data, mut spec) = (half_space_of(2), haptics(2));
-    let field = |spec: &HapticsSpec| TorqueField::new(&data, 0.5, &spec.boundary_slope).unwrap();
+    let field = |spec: &HapticsSpec| {
+        TorqueField::interpolated(&data, Interpolation::Linear, 0.5, &spec.boundary_slope).unwrap()
+    };
     assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)), []);
     spec.boundary_slope[1] = 50.0;
     spec.coupling_stiffness[0] = 30.0;

@@ -285,7 +285,7 @@ fn a_scene_is_explored_whatever_its_interpolation() {
         let kept = folder.path().join(name).with_extension("haptize");
         let on_demand = Arc::new(OnDemand::open(&path, &kept, 2, Some(1)).unwrap());
         let start = grid_of(on_demand.scene()).configuration(0);
-        let (_, exploration) = on_demand.begin(&start).unwrap();
+        let (_, exploration) = on_demand.begin(&start, on_demand.scene().haptics.interpolation).unwrap();
         assert!(exploration.end().unwrap().solved.nodes > 0, "{name}");
         let dataset = on_demand.dataset();
         assert!(dataset.refinement.is_some(), "{name}");

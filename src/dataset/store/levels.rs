@@ -18,12 +18,12 @@ pub(crate) trait Levels: Send + Sync {
     /// Number of levels, the base included.
     fn count(&self) -> u32;
 
-    /// Number of blocks that are published; none are those of nodes that do not change.
+    /// Number of blocks that are published; 0 where nodes do not change.
     fn horizon(&self) -> u64;
 
     /// Copies the numbers ([`super::record`]) that the first `horizon` blocks of `level` add at the corners of its cell
-    /// with first corner `low`: kind by kind, lengths in steps of the level, zeros where there is no node.
-    /// `C = 2^d`, `W = width(d)`.
+    /// with first corner `low`: kind by kind, lengths in steps of the level, zeros where there is no node; nothing where
+    /// there is no block. `C = 2^d`, `W = width(d)`.
     fn gather<const C: usize, const W: usize>(
         &self,
         level: u32,

@@ -14,8 +14,9 @@
 //! more than the levels below give there (their *surplus*): `w(q) = sum_l sum_n B_n(q) s_n`. The basis functions B of a
 //! node are tensor products with support in the cells around it: C1 cubic Hermite polynomials of value, slopes and
 //! mixed second derivatives. A node that was not solved has no surplus: there the function is what the coarser levels
-//! say. So w is C1, whichever nodes there are, and exact at all of them, value, gradient and mixed derivatives. (Bungartz and Griebel 2004, Sparse grids, section
-//! 3, for hats; here with Hermite data and without the sparse grid's choice of levels.)
+//! say. So w is C1, whichever nodes there are, and exact at all of them, value, gradient and mixed derivatives.
+//! (Bungartz and Griebel 2004, Sparse grids, section 3, for hats; here with Hermite data and without the sparse grid's
+//! choice of levels.)
 //!
 //! *Order of publication.* A surplus is final only if nothing below it can change: a block is published after the
 //! blocks of the level below that hold the corners of its cells. Within a published block a node that was not solved
@@ -310,33 +311,27 @@ impl Levels for Store {
             beyond.iter_mut().zip(near).for_each(|(beyond, near)| *beyond = near.wrapping_add(self.space.stride(a)));
         }
         let mut gathered = Gathered { found: false, whole: true, any: false, failed: false };
-        let (mut beside, mut inside) = (0_usize, 0_usize);
-        loop {
+        let mut blocks = [None; C];
+        for beside in (0..C).filter(|side| side & even == 0) {
             // The corner whose coordinates are all even belongs to a level below: a block of it alone does not exist.
             let is_below = is_one && level > 0 && beside == parity;
             let block = if is_below { None } else { self.blocks.get(keys[beside]) };
-            let block = block.filter(|block| block.number < horizon);
-            gathered.found |= block.is_some();
-            gathered.whole &= is_below || block.is_some();
-            loop {
-                let corner = beside | inside;
-                let place = (corner ^ odd) & places;
-                match block.and_then(|block| block.surplus_at(place, W)) {
-                    Some(surplus) => {
-                        gathered.any = true;
-                        numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
-                        gathered.failed |= block.is_some_and(|block| block.failed >> place & 1 == 1);
-                    }
-                    None => numbers.iter_mut().for_each(|number| number[corner] = 0.0),
+            blocks[beside] = block.filter(|block| block.number < horizon);
+            gathered.found |= blocks[beside].is_some();
+            gathered.whole &= is_below || blocks[beside].is_some();
+        }
+        if !gathered.found {
+            return gathered;
+        }
+        for corner in 0..C {
+            let (block, place) = (blocks[corner & odd], (corner ^ odd) & places);
+            match block.and_then(|block| block.surplus_at(place, W)) {
+                Some(surplus) => {
+                    gathered.any = true;
+                    numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
+                    gathered.failed |= block.is_some_and(|block| block.failed >> place & 1 == 1);
                 }
-                inside = inside.wrapping_sub(even) & even;
-                if inside == 0 {
-                    break;
-                }
-            }
-            beside = beside.wrapping_sub(odd) & odd;
-            if beside == 0 {
-                break;
+                None => numbers.iter_mut().for_each(|number| number[corner] = 0.0),
             }
         }
         gathered

@@ -157,8 +157,7 @@ impl Space {
 
     /// The first corners of the cells of the base, last axis fastest.
     pub fn base_cells(&self) -> impl Iterator<Item = Place> {
-        let (joints, last) = (self.joints(), self.last(0));
-        self.base_nodes().filter(move |low| (0..joints).all(|a| low[a] < last[a]))
+        (0..self.base.points()).filter_map(|point| self.base.cell_from(point))
     }
 
     /// Configuration of a node (rad or m).

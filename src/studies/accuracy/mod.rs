@@ -168,7 +168,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
         in_contact: reference.in_contact,
         left_out: reference.left_out,
         torque: reference.torque,
-        reference_error: reference.error,
+        reference_error: reference.own_error(scene, &model)?,
         joints: chain.joints.len(),
         interpolation: scene.haptics.interpolation.name(),
         points: spacing::points(scene),

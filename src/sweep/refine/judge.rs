@@ -34,14 +34,13 @@ impl Judge {
     /// Number of configurations that were solved, free ones among them.
     #[must_use]
     pub fn solved(&self) -> usize {
-        // Each is solved twice: see [`Reference::solve`].
-        2 * (self.0.places.len() + self.0.left_out)
+        self.0.solved()
     }
 
     /// Mean number of the object's nodes with a contact force, of all configurations (1).
     #[must_use]
     pub fn mean_forces(&self) -> f64 {
-        self.0.mean_forces
+        self.0.mean_forces()
     }
 
     /// Rms of the torque (N m).
@@ -59,15 +58,8 @@ impl Judge {
     #[must_use]
     pub fn measure(&self, store: &Store) -> MeasuredError {
         let errors = self.0.distances(|q| store.sample(q).torque());
-        let interpolation = Interpolation::Potential.name();
-        MeasuredError {
-            configurations: errors.len(),
-            left_out: self.0.left_out,
-            torque: self.0.torque,
-            lever_arm: self.0.lever_arm,
-            interpolation: interpolation.to_owned(),
-            errors: vec![InterpolationError::of(interpolation, errors)],
-        }
+        let interpolation = Interpolation::Potential;
+        self.0.measured(interpolation, vec![InterpolationError::of(interpolation.name(), errors)])
     }
 
     /// Replaces equilibria by lower ones that `solvers` reach from the `nodes` around them.

@@ -29,14 +29,13 @@ use super::{
     Lowered,
     lowest::applies,
     node::Scale,
-    reference::{REFERENCE_TOLERANCE, tight},
+    reference::{REFERENCE_TOLERANCE, TorqueNorm, tight},
     thin_parts,
 };
 use crate::{
     JointVector,
     contact::{Backend, Model, Solvers, Status},
     dataset::Grid,
-    scene::{JointKind, LEVER_ARM},
     store::{Nodes, Place, PublishError, Space, SpaceError, Store, beyond, record::width},
 };
 use nodebook::{HeldNodes, Nodebook, held_bytes};
@@ -154,10 +153,7 @@ impl Refine<'_> {
     /// The base alone.
     fn begin<'a, B: Backend>(&'a self, backend: &'a mut B, lowest: bool) -> Result<Filling<'a, B>, RefineError> {
         let space = Space::new(&self.base, self.levels)?;
-        let mut levers = JointVector::zeros(space.joints());
-        levers.iter_mut().zip(&self.model.chain.joints).for_each(|(lever, joint)| {
-            *lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
-        });
+        let norm = TorqueNorm::new(self.model.chain.joints.iter().map(|joint| joint.kind.unit()));
         let scale = Scale::new(self.model, &space);
         let solvers = Solvers::new(self.model, rayon::current_num_threads());
         let mut book = Nodebook::new((space.clone(), scale), (backend, self.batch), solvers, lowest);
@@ -165,7 +161,7 @@ impl Refine<'_> {
         let mut nodes = vec![BTreeSet::new(); self.levels as usize];
         nodes[0] = space.base_nodes().collect();
         let leaves = space.base_cells().map(|low| Leaf { level: 0, low, square: 0.0 });
-        Ok(Filling { book, levers, nodes, leaves: leaves.collect(), squares: HashMap::new() })
+        Ok(Filling { book, norm, nodes, leaves: leaves.collect(), squares: HashMap::new() })
     }
 }
 
@@ -180,7 +176,7 @@ struct Leaf {
 /// A store that is being filled.
 struct Filling<'a, B> {
     book: Nodebook<'a, B>,
-    levers: JointVector,
+    norm: TorqueNorm,
     /// The nodes of each level.
     nodes: Vec<BTreeSet<Place>>,
     leaves: Vec<Leaf>,
@@ -217,10 +213,8 @@ impl<B: Backend> Filling<'_, B> {
     fn torque(&self, low: &Place) -> f64 {
         let corners = 1_usize << self.book.nodes.space.joints();
         let solved = (0..corners).filter_map(|set| self.book.nodes.get(0, &beyond(low, set)));
-        let squares = solved.map(|held| {
-            let parts = held.node.result.torque.iter().zip(self.levers.iter());
-            parts.map(|(tau, lever)| (lever * tau).powi(2)).sum::<f64>()
-        });
+        let zero = JointVector::zeros(self.book.nodes.space.joints());
+        let squares = solved.map(|held| self.norm.square(&held.node.result.torque, &zero));
         (squares.sum::<f64>() / corners as f64).sqrt()
     }
 
@@ -233,8 +227,7 @@ impl<B: Backend> Filling<'_, B> {
             return 0.0;
         }
         let torque = store.sample(&nodes.space.configuration(level, node)).torque();
-        let parts = torque.iter().zip(held.node.result.torque.iter()).zip(self.levers.iter());
-        parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum()
+        self.norm.square(&torque, &held.node.result.torque)
     }
 
     /// Solves those of `nodes` of `level` that are not, and compares `store` with them.
