@@ -10,7 +10,7 @@ use crate::{
         chart,
         colour::{Colour, ColourMap, GRID, INK},
         plot::{self, Entry, Mark},
-        raster::{Camera, Raster},
+        raster::{Raster, Viewpoint},
         solid::{self, Cone},
         ticks,
     },
@@ -161,7 +161,7 @@ struct Scene<'a> {
     links: Vec<(Option<usize>, Triangles)>,
     rest: &'a [DVec3],
     triangles: &'a [[u32; 3]],
-    camera: Camera,
+    view: Viewpoint,
     map: ColourMap,
     /// Half the diagonal of the object at rest (m).
     radius: f64,
@@ -184,7 +184,7 @@ impl<'a> Scene<'a> {
             links: Vec::new(),
             rest,
             triangles,
-            camera: Camera::framing(&[], DVec3::NEG_Y, [1, 1]),
+            view: Viewpoint::framing(&[], DVec3::NEG_Y, [1, 1]),
             map: ColourMap::Pale { low: 0.0, high: if greatest > 0.0 { 1e3 * greatest } else { 1.0 } },
             radius,
             greatest_force,
@@ -198,7 +198,7 @@ impl<'a> Scene<'a> {
             framed.extend(scene.arrows(instant).into_iter().map(|(_, tip)| tip));
         }
         let direction = view(centre, instants, forces().sum());
-        scene.camera = Camera::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize));
+        scene.view = Viewpoint::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize));
         scene
     }
 
@@ -218,7 +218,7 @@ impl<'a> Scene<'a> {
     }
 
     fn picture(&self, instant: &Instant) -> Picture {
-        let mut raster = Raster::new(self.camera);
+        let mut raster = Raster::new(self.view);
         let displacement = |(n0, n): (&DVec3, &DVec3)| 1e3 * (*n - *n0).length();
         let colours: Vec<Colour> =
             self.rest.iter().zip(&instant.nodes).map(|pair| self.map.colour(displacement(pair))).collect();
@@ -291,7 +291,7 @@ mod tests {
     }
 
     fn at(picture: &Picture, scene: &Scene, point: DVec3) -> [u8; 3] {
-        let seen = scene.camera.project(point).unwrap();
+        let seen = scene.view.project(point).unwrap();
         picture.pixels[seen.y as usize * picture.width + seen.x as usize]
     }
 
@@ -319,7 +319,7 @@ mod tests {
         let scene = Scene::new(&chain, &nodes, &triangles, &instants);
         let [free, pressed] = [0, 1].map(|number: usize| scene.picture(&instants[number]));
         // Half way between the vertex's two places, beside the arrow: object before, nothing after.
-        let [right, ..] = scene.camera.axes();
+        let [right, ..] = scene.view.camera.axes();
         let between = nodes[4] - DVec3::Z * 0.009 + 0.005 * right;
         assert_ne!(at(&free, &scene, between), [255; 3]);
         assert_eq!(at(&pressed, &scene, between), [255; 3]);

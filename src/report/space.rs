@@ -18,7 +18,7 @@ use crate::{
         chart,
         colour::{self, ColourMap},
         plot::{self, Entry, Mark},
-        raster::{Camera, Raster},
+        raster::{Raster, Viewpoint},
         ticks,
     },
     report::PIXELS,
@@ -43,7 +43,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
     let direction =
         view(points.iter().copied().filter(|point| trusted(point)).map(|point| (place(point), magnitude(point))));
     let size = [PICTURE.width, PICTURE.height].map(|side| (side * PIXELS) as usize);
-    let mut raster = Raster::new(Camera::framing(&space_box.with_labels(direction), direction, size));
+    let mut raster = Raster::new(Viewpoint::framing(&space_box.with_labels(direction), direction, size));
     space_box.draw_walls(&mut raster, direction);
     for &point in &points {
         if trusted(&point) {
@@ -63,7 +63,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
         let entry = Entry { name: format!("{untrusted} not converged"), colour: UNTRUSTED, mark: Mark::Dot };
         plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &[entry]);
     }
-    space_box.label(&mut canvas, raster.camera(), direction, dataset);
+    space_box.label(&mut canvas, raster.view(), direction, dataset);
     canvas.picture((PICTURE.x, PICTURE.y), raster.picture());
     let unit =
         if is_mixed(dataset) { "N m" } else { dataset.grid.axes.first().map_or("N m", |axis| axis.effort_unit()) };
@@ -216,15 +216,16 @@ impl Box3 {
     }
 
     /// Tick labels and titles along the three front edges: two of the floor, one upright on the left.
-    fn label(&self, canvas: &mut Canvas, camera: &Camera, direction: DVec3, dataset: &Dataset) {
+    fn label(&self, canvas: &mut Canvas, view: &Viewpoint, direction: DVec3, dataset: &Dataset) {
         let signs = direction.signum();
+        let [right, ..] = view.camera.axes();
         let on_sheet = |point: DVec3| {
-            let at = camera.project(point)?;
+            let at = view.project(point)?;
             Some((PICTURE.x + at.x / PIXELS, PICTURE.y + at.y / PIXELS))
         };
         let upright = [DVec3::new(signs.x, -signs.y, 0.0), DVec3::new(-signs.x, signs.y, 0.0)]
             .into_iter()
-            .min_by(|a, b| camera.axes()[0].dot(*a).total_cmp(&camera.axes()[0].dot(*b)))
+            .min_by(|a, b| right.dot(*a).total_cmp(&right.dot(*b)))
             .unwrap_or(signs);
         let edges = [DVec3::new(0.0, signs.y, -1.0), DVec3::new(signs.x, 0.0, -1.0), upright];
         for (axis, edge) in edges.into_iter().enumerate().take(dataset.grid.joints()) {
@@ -248,7 +249,7 @@ impl Box3 {
                 top.z = 0.5 * self.sides.z;
                 (on_sheet(top).map(|at| (at.0 + 16.0, at.1 - 16.0)), Anchor::End)
             } else {
-                let rightwards = camera.axes()[0].dot(outward) > 0.0;
+                let rightwards = right.dot(outward) > 0.0;
                 let shift = if rightwards { 34.0 } else { -34.0 };
                 (on_sheet(base + 0.12 * outward).map(|at| (at.0 + shift, at.1 + 20.0)), Anchor::Middle)
             };

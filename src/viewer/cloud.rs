@@ -3,9 +3,9 @@
 //! stay at the grid line nearest to the configuration.
 
 use super::{
-    camera::Camera,
+    aspect,
     loaded::Loaded,
-    number, palette,
+    number, on_screen, palette,
     slices::gradient,
     theme::{self, COLOUR_BAR, FINE_GAP, GAP, HAIRLINE, ROUNDING},
 };
@@ -13,21 +13,21 @@ use crate::{
     JointVector,
     contact::Status,
     dataset::Dataset,
-    draw::colour::ColourMap,
+    draw::{camera::Camera, colour::ColourMap},
     report::slices::{torque_size, torque_size_label},
 };
 use eframe::egui::{self, Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
-use glam::{Vec2, Vec3};
+use glam::{DVec2, DVec3};
 
 /// From where it is seen at first (rad): a little more from the side than the 3-D scene, so that all three names show.
-const AZIMUTH: f32 = -0.95;
-const ELEVATION: f32 = 0.45;
+const AZIMUTH: f64 = -0.95;
+const ELEVATION: f64 = 0.45;
 
 /// Radius of what is seen whole about the box from -1 to 1: its corners, at sqrt 3, and the names beside them.
-const SEEN: f32 = 2.1;
+const SEEN: f64 = 2.1;
 
 /// Distance of names from the box's middle, over that of its faces (1).
-const NAMES: f32 = 1.18;
+const NAMES: f64 = 1.18;
 
 /// Radius of a dot at the greatest torque over the distance of neighbours: nearly touching (1); within these limits
 /// (points); and of the least torque over that of the greatest (1).
@@ -55,7 +55,7 @@ pub struct Cloud {
 /// A configuration in contact.
 struct Point {
     /// In the box from -1 to 1.
-    place: Vec3,
+    place: DVec3,
     torque: f64,
     status: Status,
 }
@@ -84,7 +84,7 @@ impl Cloud {
         let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "Cloud of contacts in C-space"));
         let moved = response.drag_delta() / rect.height();
-        self.camera.orbit(Vec2::new(moved.x, moved.y));
+        self.camera.orbit(DVec2::new(moved.x.into(), moved.y.into()));
         if response.double_clicked() {
             self.camera = home();
         }
@@ -97,11 +97,9 @@ impl Cloud {
         let palette = palette::of(ui.visuals());
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, f32::from(ROUNDING), palette.stage);
-        let clip = self.camera.clip(rect.width() / rect.height());
-        let show = |place: Vec3| -> (Pos2, f32) {
-            let shown = clip.project_point3(place);
-            let at = rect.center() + 0.5 * vec2(shown.x * rect.width(), -shown.y * rect.height());
-            (at, shown.z)
+        let show = |place: DVec3| {
+            let seen = self.camera.project(place, aspect(rect));
+            seen.map_or((rect.center(), 0.0), |seen| (on_screen(rect, seen.at), seen.depth))
         };
         self.frame(
             &painter,
@@ -111,7 +109,7 @@ impl Cloud {
             palette.axis.gamma_multiply(palette::FAINT),
         );
         let map = ColourMap::Root { high: self.high };
-        let mut dots: Vec<(Pos2, f32, &Point)> = points
+        let mut dots: Vec<(Pos2, f64, &Point)> = points
             .iter()
             .map(|point| {
                 let (at, depth) = show(point.place);
@@ -123,7 +121,7 @@ impl Cloud {
         let shown = grid.axes.len().min(3) as f32;
         let cell = grid.axes.iter().take(3).map(|axis| 2.0 / axis.count as f32).product::<f32>().powf(1.0 / shown);
         let cell = cell * self.pitch as f32;
-        let radius = (DOT * cell / self.camera.height_at_target() * rect.height()).clamp(DOTS[0], DOTS[1]);
+        let radius = (DOT * cell / self.camera.height_at_target() as f32 * rect.height()).clamp(DOTS[0], DOTS[1]);
         for (at, _, point) in dots {
             let share = (point.torque / self.high.max(f64::MIN_POSITIVE)).cbrt().clamp(LEAST_SHARE, 1.0) as f32;
             let colour =
@@ -159,7 +157,7 @@ impl Cloud {
     fn frame(
         &self,
         painter: &egui::Painter,
-        show: &dyn Fn(Vec3) -> (Pos2, f32),
+        show: &dyn Fn(DVec3) -> (Pos2, f64),
         dataset: &Dataset,
         text: Color32,
         line: Color32,
@@ -167,7 +165,7 @@ impl Cloud {
         let small = theme::small();
         for axis in 0..3 {
             for (u, v) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
-                let mut ends = [Vec3::ZERO; 2];
+                let mut ends = [DVec3::ZERO; 2];
                 for (end, along) in ends.iter_mut().zip([-1.0, 1.0]) {
                     (end[axis], end[(axis + 1) % 3], end[(axis + 2) % 3]) = (along, u, v);
                 }
@@ -175,12 +173,12 @@ impl Cloud {
             }
         }
         // Names along the edges of the floor nearest to the eye, and along the upright one farthest left.
-        let toward = self.camera.backward();
-        let near = |component: f32| if component < 0.0 { -1.0 } else { 1.0 };
+        let [.., toward] = self.camera.axes();
+        let near = |component: f64| if component < 0.0 { -1.0 } else { 1.0 };
         let [x, y] = [near(toward.x), near(toward.y)];
-        let places = [Vec3::new(0.0, NAMES * y, -NAMES), Vec3::new(NAMES * x, 0.0, -NAMES)];
-        let left = [Vec3::new(x, -y, 0.0), Vec3::new(-x, y, 0.0)];
-        let upright = left.into_iter().min_by(|a, b| show(*a).0.x.total_cmp(&show(*b).0.x)).unwrap_or(Vec3::ZERO);
+        let places = [DVec3::new(0.0, NAMES * y, -NAMES), DVec3::new(NAMES * x, 0.0, -NAMES)];
+        let left = [DVec3::new(x, -y, 0.0), DVec3::new(-x, y, 0.0)];
+        let upright = left.into_iter().min_by(|a, b| show(*a).0.x.total_cmp(&show(*b).0.x)).unwrap_or(DVec3::ZERO);
         for (joint, (axis, place)) in dataset.grid.axes.iter().zip(places.into_iter().chain([upright])).enumerate() {
             let align = if joint == 2 { Align2::RIGHT_CENTER } else { Align2::CENTER_CENTER };
             let offset = if joint == 2 { vec2(-GAP, 0.0) } else { vec2(0.0, GAP) };
@@ -195,16 +193,15 @@ impl Cloud {
 }
 
 fn home() -> Camera {
-    Camera { azimuth: AZIMUTH, elevation: ELEVATION, ..Camera::looking_at(Vec3::ZERO, SEEN) }
+    Camera { azimuth: AZIMUTH, elevation: ELEVATION, ..Camera::looking_at(DVec3::ZERO, SEEN) }
 }
 
-/// Size of the torque of a grid point (N m).
 /// Returns where a configuration lies in the box from -1 to 1; missing joints in its middle, or on its floor.
-fn place(dataset: &Dataset, q: &JointVector) -> Vec3 {
-    let mut place = Vec3::new(0.0, 0.0, if dataset.grid.joints() < 3 { -1.0 } else { 0.0 });
+fn place(dataset: &Dataset, q: &JointVector) -> DVec3 {
+    let mut place = DVec3::new(0.0, 0.0, if dataset.grid.joints() < 3 { -1.0 } else { 0.0 });
     for (joint, axis) in dataset.grid.axes.iter().enumerate().take(3) {
         let half = 0.5 * axis.step * (axis.count - 1).max(1) as f64;
-        place[joint] = ((q[joint] - axis.start) / half - 1.0) as f32;
+        place[joint] = (q[joint] - axis.start) / half - 1.0;
     }
     place
 }

@@ -10,7 +10,7 @@
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
 //! | `lead` | a haptic device that leads in the place of all these |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
-//! | `steering`, `node_drag`, `camera` | whence it is seen, and the pointer's grip on the proxy |
+//! | `steering`, `node_drag` | whence it is seen, and the pointer's grip on the proxy |
 //! | `view_renderer`, `pipelines`, `shapes`, `links`, `pixels` | the renderer of that panel |
 //! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
 //! | `legend`, `steps` | a sample and its name, the first screen |
@@ -21,7 +21,6 @@
 mod app;
 mod background;
 mod body;
-mod camera;
 mod cloud;
 mod column;
 mod controls;
@@ -66,6 +65,8 @@ use crate::{
     memory,
     sweep::{OTHER_ADAPTER, remedied},
 };
+use eframe::egui::{Pos2, Rect, vec2};
+use glam::DVec2;
 
 /// Gives `ctx` the window's type, spacing and colours.
 pub fn dress(ctx: &eframe::egui::Context) {
@@ -132,6 +133,16 @@ impl From<GpuError> for ViewError {
             error => Self::Gpu(error),
         }
     }
+}
+
+/// Width over height of a picture in `rect`.
+fn aspect(rect: Rect) -> f64 {
+    f64::from(rect.width() / rect.height().max(1.0))
+}
+
+/// Where a point of the picture in `rect` is, x right and y up from -1 to 1.
+fn on_screen(rect: Rect, at: DVec2) -> Pos2 {
+    rect.center() + 0.5 * vec2(at.x as f32 * rect.width(), -at.y as f32 * rect.height())
 }
 
 /// A number with three digits, as labels show it.

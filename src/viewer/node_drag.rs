@@ -1,13 +1,13 @@
 //! The pointer's grip on the proxy: which node it holds, and where it takes it. The ray through the pointer meets the
 //! plane through the node that faces the eye; inverse kinematics turns that place into joint coordinates.
 
-use super::camera::Camera;
 use crate::{
     JointVector,
+    draw::camera::Camera,
     proxy::inverse_kinematics::approach,
     proxy::{Chain, Pose},
 };
-use glam::{Vec2, Vec3};
+use glam::{DVec2, DVec3};
 
 /// A node of the proxy in the pointer's hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,29 +15,28 @@ pub struct NodeDrag {
     /// Number of the proxy's node.
     pub node: usize,
     /// Where the node was when it was gripped (m): a point of the plane in which it is moved.
-    anchor: Vec3,
+    anchor: DVec3,
     /// From the pointer's place in that plane to the node (m).
-    offset: Vec3,
+    offset: DVec3,
 }
 
 /// How near to a node the pointer must be, in heights of the picture.
-const REACH: f32 = 0.05;
+const REACH: f64 = 0.05;
 
 impl NodeDrag {
     /// Takes the node nearest to the picture point `at` (x right, y up, from -1 to 1), if one is near.
     #[must_use]
-    pub fn take(camera: &Camera, aspect: f32, at: Vec2, pose: &Pose) -> Option<Self> {
-        let clip = camera.clip(aspect);
-        let distance = |node: &Vec3| {
-            let shown = clip.project_point3(*node).truncate() - at;
-            0.5 * Vec2::new(shown.x * aspect, shown.y).length()
+    pub fn take(camera: &Camera, aspect: f64, at: DVec2, pose: &Pose) -> Option<Self> {
+        let distance = |node: &DVec3| {
+            let way = camera.project(*node, aspect).map_or(DVec2::INFINITY, |seen| seen.at - at);
+            0.5 * DVec2::new(way.x * aspect, way.y).length()
         };
-        let nodes = pose.nodes.iter().map(|node| node.as_vec3()).enumerate();
+        let nodes = pose.nodes.iter().copied().enumerate();
         let (node, anchor) = nodes.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
         if distance(&anchor) > REACH {
             return None;
         }
-        let met = camera.ray(at, aspect).meet_plane(anchor, camera.backward())?;
+        let met = camera.ray(at, aspect).meet_plane(anchor, camera.axes()[2])?;
         Some(Self { node, anchor, offset: anchor - met })
     }
 
@@ -47,13 +46,13 @@ impl NodeDrag {
     pub fn lead(
         &self,
         camera: &Camera,
-        aspect: f32,
-        at: Vec2,
+        aspect: f64,
+        at: DVec2,
         chain: &Chain,
         from: &JointVector,
     ) -> Option<JointVector> {
-        let met = camera.ray(at, aspect).meet_plane(self.anchor, camera.backward())?;
-        Some(approach(chain, self.node, (met + self.offset).as_dvec3(), from).0)
+        let met = camera.ray(at, aspect).meet_plane(self.anchor, camera.axes()[2])?;
+        Some(approach(chain, self.node, met + self.offset, from).0)
     }
 }
 
@@ -69,17 +68,17 @@ mod tests {
         let q = JointVector::from_slice(&[0.0, 1.4, -1.9]);
         let mut pose = chain.new_pose();
         chain.pose(&q, &mut pose);
-        let camera = Camera::looking_at(Vec3::new(0.0, 0.0, 0.08), 0.2);
+        let camera = Camera::looking_at(DVec3::new(0.0, 0.0, 0.08), 0.2);
         let aspect = 1.3;
         let node = pose.nodes.len() - 1;
-        let shown = camera.clip(aspect).project_point3(pose.nodes[node].as_vec3()).truncate();
+        let shown = camera.project(pose.nodes[node], aspect).unwrap().at;
         let grip = NodeDrag::take(&camera, aspect, shown, &pose).unwrap();
         assert_eq!(grip.node, node);
-        let target = shown + Vec2::new(0.02, -0.05);
+        let target = shown + DVec2::new(0.02, -0.05);
         let led = grip.lead(&camera, aspect, target, &chain, &q).unwrap();
         chain.pose(&led, &mut pose);
-        let now = camera.clip(aspect).project_point3(pose.nodes[node].as_vec3()).truncate();
+        let now = camera.project(pose.nodes[node], aspect).unwrap().at;
         assert!(now.distance(target) < 1e-4, "{now} is not {target}");
-        assert!(NodeDrag::take(&camera, aspect, Vec2::new(0.9, -0.9), &pose).is_none());
+        assert!(NodeDrag::take(&camera, aspect, DVec2::new(0.9, -0.9), &pose).is_none());
     }
 }

@@ -2,7 +2,6 @@
 
 use super::{
     body::Body,
-    camera::Camera,
     number,
     palette::Palette,
     slices::gradient,
@@ -10,9 +9,9 @@ use super::{
     trimmed,
     view_renderer::Quantity,
 };
-use crate::draw::colour::ColourMap;
+use crate::draw::{camera::Camera, colour::ColourMap};
 use eframe::egui::{Align2, Painter, Rect, Stroke, Ui, Vec2, vec2};
-use glam::Vec3;
+use glam::DVec3;
 
 // From the picture's lower left corner [points]: axes, how long they are and where their names are over that [1], the
 // scale and how long it is at most. From its lower right: the end of the bar of colours, and how long that is. In a
@@ -54,10 +53,10 @@ pub fn show(
 
 /// Axes, turned as the scene is.
 fn axes(ui: &Ui, painter: &Painter, rect: Rect, palette: &Palette, camera: &Camera) {
-    let [right, up] = camera.right_and_up();
+    let [right, up, _] = camera.axes();
     let origin = rect.left_bottom() + AXES_AT;
-    for (axis, name) in [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z")] {
-        let end = vec2(axis.dot(right), -axis.dot(up)) * AXES_LENGTH;
+    for (axis, name) in [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")] {
+        let end = vec2(axis.dot(right) as f32, -axis.dot(up) as f32) * AXES_LENGTH;
         painter.line_segment([origin, origin + end], Stroke::new(AXIS_LINE, palette.axis));
         let at = origin + end * AXES_NAMES;
         painter.text(at, Align2::CENTER_CENTER, name, theme::small(), ui.visuals().text_color());
@@ -66,7 +65,7 @@ fn axes(ui: &Ui, painter: &Painter, rect: Rect, palette: &Palette, camera: &Came
 
 /// A round length at the distance of what is looked at.
 fn scale(ui: &Ui, painter: &Painter, rect: Rect, palette: &Palette, camera: &Camera) {
-    let points_per_metre = rect.height() / camera.height_at_target();
+    let points_per_metre = rect.height() / camera.height_at_target() as f32;
     let room = bar(rect).left() - rect.left() - SCALE_AT.x - GAP;
     let length = round_length(f64::from(room.clamp(LEAST_SCALE, LONGEST_SCALE) / points_per_metre));
     let width = length as f32 * points_per_metre;

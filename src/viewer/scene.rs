@@ -1,31 +1,33 @@
 //! The panel with the 3-D scene: the object as the GPU moves it, the proxy, forces, the device's ghost.
 
 use super::{
-    ViewError,
+    ViewError, aspect,
     background::Following,
     body::Body,
-    camera::Camera,
     feel::Feel,
     links::Links,
     loaded::Loaded,
-    overlay,
+    on_screen, overlay,
     palette::{self, Palette, figure_colour},
     shapes::Shape,
     steering::Steering,
     view_renderer::{Look, Quantity, ViewRenderer},
 };
 use crate::{
-    draw::solid::{self, Cone},
+    draw::{
+        camera::Camera,
+        solid::{self, Cone},
+    },
     gpu::{Context, FrameError},
     proxy::{Chain, Pose},
     render::session::Latest,
     scene::GraphicsEffects,
 };
 use eframe::{
-    egui::{self, Color32, Rect, Sense, Ui, pos2, vec2},
+    egui::{self, Color32, Rect, Sense, Ui, pos2},
     egui_wgpu::RenderState,
 };
-use glam::Vec3;
+use glam::DVec3;
 use std::sync::Arc;
 
 /// The parts of the scene that the user wants to see.
@@ -58,7 +60,7 @@ pub struct SceneView {
     /// The parts that are shown.
     pub shown: Shown,
     /// Extent of the scene (m).
-    extent: f32,
+    extent: f64,
 }
 
 // Sizes of the proxy: a link's radius over the extent of the scene; all others over that radius [1].
@@ -72,10 +74,10 @@ const ARROW: f64 = 0.55;
 const LONGEST_ARROW: f64 = 0.5;
 
 /// Radius of what is seen at first over the extent of the scene (1): a little less than all, whose corners are empty.
-const SEEN: f32 = 0.98;
+const SEEN: f64 = 0.98;
 
 /// Extent of a scene with nothing in it (m).
-const NO_EXTENT: f32 = 0.1;
+const NO_EXTENT: f64 = 0.1;
 
 impl SceneView {
     /// An empty scene, drawn with `samples` a pixel.
@@ -88,7 +90,7 @@ impl SceneView {
             context,
             render,
             texture: None,
-            steering: Steering::new(Camera::looking_at(Vec3::ZERO, NO_EXTENT)),
+            steering: Steering::new(Camera::looking_at(DVec3::ZERO, NO_EXTENT)),
             body: None,
             links: None,
             redrawing: Following::new(None),
@@ -113,10 +115,9 @@ impl SceneView {
         // Without memory for them on the device, the arm is drawn from joint to joint.
         self.links = Links::new(&self.context, &loaded.setup.scene.shapes, chain.joints.len()).unwrap_or_default();
         let object = loaded.setup.object.iter().flat_map(|object| &object.rest);
-        let points: Vec<Vec3> =
-            object.chain(&self.pose.nodes).chain(&self.pose.origins).map(|point| point.as_vec3()).collect();
-        let least = points.iter().copied().reduce(Vec3::min).unwrap_or(Vec3::ZERO);
-        let greatest = points.iter().copied().reduce(Vec3::max).unwrap_or(Vec3::ZERO);
+        let points: Vec<DVec3> = object.chain(&self.pose.nodes).chain(&self.pose.origins).copied().collect();
+        let least = points.iter().copied().reduce(DVec3::min).unwrap_or(DVec3::ZERO);
+        let greatest = points.iter().copied().reduce(DVec3::max).unwrap_or(DVec3::ZERO);
         self.extent = 0.5 * least.distance(greatest);
         self.steering = Steering::new(Camera::looking_at(0.5 * (least + greatest), SEEN * self.extent));
     }
@@ -175,9 +176,8 @@ impl SceneView {
     /// Returns where the proxy's last node is shown in `rect`.
     #[must_use]
     pub fn tip_in(&self, rect: Rect) -> Option<egui::Pos2> {
-        let tip = self.pose.nodes.last()?.as_vec3();
-        let shown = self.steering.camera.clip(rect.width() / rect.height().max(1.0)).project_point3(tip);
-        Some(rect.center() + 0.5 * vec2(shown.x * rect.width(), -shown.y * rect.height()))
+        let tip = *self.pose.nodes.last()?;
+        Some(on_screen(rect, self.steering.camera.project(tip, aspect(rect))?.at))
     }
 
     /// Shows the scene in all of `ui`, and lets pointer and keys lead the hand of `feel`.
@@ -252,7 +252,7 @@ impl SceneView {
 
     /// Everything that is drawn besides the surface.
     fn shapes(&self, palette: &Palette, chain: &Chain) -> Vec<Shape> {
-        let (extent, unit) = (f64::from(self.extent), LINK * f64::from(self.extent));
+        let unit = LINK * self.extent;
         let plain = |link: usize| !self.links.as_ref().is_some_and(|links| links.is_shaped(link));
         let mut cones = solid::links(chain, &self.pose, plain, unit, figure_colour(palette.link));
         cones.extend(solid::nodes(chain, &self.pose, plain, unit, figure_colour(palette.node)));
@@ -273,7 +273,12 @@ impl SceneView {
                 let mut cones = vec![Cone::ball(rest, CONTACT_BALL * unit, colour)];
                 if self.shown.forces {
                     // On the proxy, against the force on the object: the arrow stands out of the surface.
-                    cones.extend(Cone::arrow(rest, -force * (LONGEST_ARROW * extent / longest), ARROW * unit, colour));
+                    cones.extend(Cone::arrow(
+                        rest,
+                        -force * (LONGEST_ARROW * self.extent / longest),
+                        ARROW * unit,
+                        colour,
+                    ));
                 }
                 shapes.extend(cones.iter().map(|cone| Shape::from(cone).anchored(node)));
             }

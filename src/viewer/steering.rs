@@ -2,13 +2,16 @@
 //! drags it; keys move joints.
 
 use super::{
-    camera::Camera,
+    aspect,
     guide::{Guide, Keys},
     node_drag::NodeDrag,
 };
-use crate::proxy::{Chain, Pose};
+use crate::{
+    draw::camera::Camera,
+    proxy::{Chain, Pose},
+};
 use eframe::egui::{CursorIcon, InputState, Key, PointerButton, Pos2, Rect, Response, Ui};
-use glam::Vec2;
+use glam::DVec2;
 
 /// Camera and grip.
 pub struct Steering {
@@ -33,7 +36,7 @@ pub const HELP: [(&str, &str); 8] = [
 
 /// Zoom for each point that the wheel turns, as a logarithm (1/point): a notch, some 50 points, brings the eye nearer
 /// by a tenth.
-const ZOOM_PER_POINT: f32 = 0.002;
+const ZOOM_PER_POINT: f64 = 0.002;
 
 impl Steering {
     /// Looks from `home`.
@@ -50,10 +53,10 @@ impl Steering {
     /// Does what pointer and keys ask for over the picture in `rect`: `response` is that of the picture, `pose` the
     /// proxy's as it is shown there.
     pub fn steer(&mut self, ui: &Ui, response: &Response, rect: Rect, chain: &Chain, pose: &Pose, guide: &mut Guide) {
-        let aspect = rect.width() / rect.height().max(1.0);
+        let aspect = aspect(rect);
         let at = |p: Pos2| {
             let from_centre = p - rect.center();
-            Vec2::new(2.0 * from_centre.x / rect.width(), -2.0 * from_centre.y / rect.height())
+            DVec2::new((2.0 * from_centre.x / rect.width()).into(), (-2.0 * from_centre.y / rect.height()).into())
         };
         let pressed = ui.input(|input| input.pointer.press_origin());
         if !guide.is_handed_over()
@@ -66,7 +69,7 @@ impl Steering {
             self.grip = None;
         }
         let moved = response.drag_delta() / rect.height().max(1.0);
-        let moved = Vec2::new(moved.x, moved.y);
+        let moved = DVec2::new(moved.x.into(), moved.y.into());
         match (self.grip, response.interact_pointer_pos()) {
             (Some(grip), Some(pointer)) if response.dragged() => {
                 let from = guide.goal();
@@ -85,7 +88,7 @@ impl Steering {
         }
         if response.contains_pointer() {
             let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));
-            self.camera.zoom((-ZOOM_PER_POINT * scroll).exp() / pinch);
+            self.camera.zoom((-ZOOM_PER_POINT * f64::from(scroll)).exp() / f64::from(pinch));
         }
         let meant = response.hovered() && ui.memory(|memory| memory.focused().is_none());
         let held = |input: &InputState| if meant { held(input) } else { Keys::default() };

@@ -2,13 +2,12 @@
 //! own with depth and several samples a pixel. The window shows the texture; a screenshot reads it.
 
 use super::{
-    camera::Camera,
     links::{DrawnLinks, filled},
     pipelines::{self, DEPTH, FORMAT, View, bind},
     shapes::{Shape, unit_shape},
 };
 use crate::{
-    draw::colour::ColourMap,
+    draw::{camera::Camera, colour::ColourMap},
     gpu::{Context, FrameUpdate, GpuError},
     object::Object,
 };
@@ -191,17 +190,17 @@ impl ViewRenderer {
 const LIGHT: [f32; 3] = [0.45, 0.75, 0.65];
 
 fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>) -> View {
-    let [right, up] = camera.right_and_up();
+    let [right, up, towards] = camera.axes().map(|axis| axis.as_vec3());
     let [across, above, behind] = LIGHT;
-    let light = (across * right + above * up + behind * camera.backward()).normalize_or_zero();
+    let light = (across * right + above * up + behind * towards).normalize_or_zero();
     let map = ColourMap::Pale { low: 0.0, high: 1.0 };
     let stop = |number: usize| {
         let [red, green, blue] = map.colour(number as f64 / 4.0).channels();
         [red, green, blue, 1.0]
     };
     View {
-        clip: camera.clip(size[0] as f32 / size[1] as f32).to_cols_array_2d(),
-        eye: camera.eye().extend(1.0).to_array(),
+        clip: camera.clip(f64::from(size[0]) / f64::from(size[1])).to_cols_array_2d(),
+        eye: camera.eye().as_vec3().extend(1.0).to_array(),
         light: light.extend(0.0).to_array(),
         stops: std::array::from_fn(stop),
         colour_top: look.colour_top,

@@ -15,7 +15,6 @@ const ALL: &str = "all above";
 const SHARED_NAMES: &[&str] = &[
     "Arguments",
     "Body",
-    "Camera",
     "Column",
     "Contact",
     "Contacts",

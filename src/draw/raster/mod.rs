@@ -5,12 +5,9 @@
 //! with the depth of a sphere, which is exact up to the perspective of their rim.
 //! No randomness, no threads: equal scenes give equal pixels.
 
-mod camera;
 mod shapes;
 
-pub use camera::{Camera, Projected};
-
-use super::{canvas::Picture, colour::Colour};
+use super::{camera::Camera, canvas::Picture, colour::Colour};
 use glam::DVec3;
 
 /// Samples a pixel along each side.
@@ -36,11 +33,51 @@ pub struct Vertex {
     pub colour: Colour,
 }
 
+/// A camera, and the picture that it takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Viewpoint {
+    /// The camera.
+    pub camera: Camera,
+    /// Pixels across and down.
+    pub size: [usize; 2],
+}
+
+/// A point on the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projected {
+    /// Pixels from the left edge.
+    pub x: f64,
+    /// Pixels from the top edge.
+    pub y: f64,
+    /// One over the distance along the view (1/m); larger is nearer.
+    pub nearness: f64,
+}
+
+impl Viewpoint {
+    /// Frames `points`, seen from the side of `direction`.
+    #[must_use]
+    pub fn framing(points: &[DVec3], direction: DVec3, size: [usize; 2]) -> Self {
+        let [width, height] = size.map(|side| side.max(1) as f64);
+        Self { camera: Camera::framing(points, direction, width / height), size }
+    }
+
+    /// Returns where `point` appears; `None` behind the eye or if it is not a number.
+    #[must_use]
+    pub fn project(&self, point: DVec3) -> Option<Projected> {
+        let [width, height] = self.size.map(|side| side as f64);
+        let seen = self.camera.project(point, width / height)?;
+        let (x, y) = (0.5 * width * (1.0 + seen.at.x), 0.5 * height * (1.0 - seen.at.y));
+        Some(Projected { x, y, nearness: 1.0 / seen.depth })
+    }
+}
+
 /// A picture in the making.
 pub struct Raster {
-    camera: Camera,
+    view: Viewpoint,
     width: usize,
     height: usize,
+    /// Right, up, towards the viewer.
+    axes: [DVec3; 3],
     /// Linear light, a sample each.
     light: Vec<[f32; 3]>,
     /// Directions towards key light, fill light, and the highlight's mirror normal.
@@ -50,17 +87,18 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// An empty picture as large as the camera's, white.
+    /// An empty picture, white.
     #[must_use]
-    pub fn new(camera: Camera) -> Self {
-        let (width, height) = (camera.width * SAMPLES, camera.height * SAMPLES);
-        let [right, up, towards] = camera.axes();
+    pub fn new(view: Viewpoint) -> Self {
+        let [width, height] = view.size.map(|side| side * SAMPLES);
+        let axes @ [right, up, towards] = view.camera.axes();
         // The key stands above the viewer's left shoulder, the fill low on the right.
         let key = (0.55 * towards + 0.65 * up - 0.5 * right).normalize();
         let fill = (0.6 * towards - 0.1 * up + 0.8 * right).normalize();
         Self {
             lights: [key, fill, (key + towards).normalize()],
-            camera,
+            view,
+            axes,
             width,
             height,
             light: vec![[1.0; 3]; width * height],
@@ -68,10 +106,10 @@ impl Raster {
         }
     }
 
-    /// Returns the camera.
+    /// Returns the view.
     #[must_use]
-    pub fn camera(&self) -> &Camera {
-        &self.camera
+    pub fn view(&self) -> &Viewpoint {
+        &self.view
     }
 
     /// A triangle. One with a corner behind the camera or not a number is left out: the camera stands outside.
@@ -114,11 +152,11 @@ impl Raster {
     /// A sphere.
     pub fn sphere(&mut self, centre: DVec3, radius: f64, colour: Colour) {
         let Some(middle) = self.project(centre) else { return };
-        let size = radius * self.camera.magnification() * SAMPLES as f64 * middle.nearness;
+        let size = radius * middle.nearness * 0.5 * self.height as f64 / (0.5 * self.view.camera.field).tan();
         let colour = linear(colour);
         let corner = |sign: f64| Projected { x: middle.x + sign * size, y: middle.y + sign * size, ..middle };
         let (columns, rows) = self.covered([corner(-1.0), middle, corner(1.0)]);
-        let axes = self.camera.axes();
+        let axes = self.axes;
         for row in rows {
             for column in columns.clone() {
                 let (x, y) = ((column as f64 + 0.5 - middle.x) / size, (row as f64 + 0.5 - middle.y) / size);
@@ -177,7 +215,7 @@ impl Raster {
     /// The finished picture.
     #[must_use]
     pub fn picture(&self) -> Picture {
-        let (width, height) = (self.camera.width, self.camera.height);
+        let [width, height] = self.view.size;
         let pixel = |index: usize| {
             let (column, row) = (index % width * SAMPLES, index / width * SAMPLES);
             let mut sum = [0.0_f32; 3];
@@ -191,7 +229,7 @@ impl Raster {
 
     /// In samples.
     fn project(&self, point: DVec3) -> Option<Projected> {
-        let projected = self.camera.project(point)?;
+        let projected = self.view.project(point)?;
         Some(Projected { x: projected.x * SAMPLES as f64, y: projected.y * SAMPLES as f64, ..projected })
     }
 
@@ -222,7 +260,7 @@ impl Raster {
         if finish == Finish::Flat {
             return colour;
         }
-        let towards = self.camera.axes()[2];
+        let towards = self.axes[2];
         // Closed bodies only: a normal that points away belongs to a surface interpolated across its rim.
         let away = normal.dot(towards).min(0.0);
         let normal = if away < 0.0 { (normal - away * towards).normalize_or_zero() } else { normal };
@@ -256,8 +294,8 @@ mod tests {
 
     const RED: Colour = Colour::hex(0xd0_30_20);
 
-    fn camera() -> Camera {
-        Camera::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], DVec3::new(1.0, -2.0, 0.8), [160, 120])
+    fn view() -> Viewpoint {
+        Viewpoint::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], DVec3::new(1.0, -2.0, 0.8), [160, 120])
     }
 
     fn pixel(picture: &Picture, at: Projected) -> [u8; 3] {
@@ -266,15 +304,15 @@ mod tests {
 
     #[test]
     fn a_sphere_covers_its_silhouette_and_nothing_else() {
-        let mut raster = Raster::new(camera());
+        let mut raster = Raster::new(view());
         raster.sphere(DVec3::ZERO, 0.5, RED);
-        let [right, _, towards] = raster.camera().axes();
+        let [right, _, towards] = raster.axes;
         let picture = raster.picture();
         // Silhouette of a sphere: the circle where lines of sight touch it, r sqrt(1 - (r/d)^2) off the centre.
-        let distance = raster.camera().distance(DVec3::ZERO);
+        let distance = raster.view().camera.eye().dot(towards);
         for (offset, covered) in [(0.93, true), (1.09, false)] {
             let rim = offset * 0.5 * (1.0 - (0.5 / distance).powi(2)).sqrt() * right + 0.5 * 0.5 / distance * towards;
-            let at = raster.camera().project(rim).unwrap();
+            let at = raster.view().project(rim).unwrap();
             assert_eq!(pixel(&picture, at) != [255; 3], covered, "at {offset} radii");
         }
     }
@@ -282,8 +320,8 @@ mod tests {
     #[test]
     fn the_nearer_body_hides_the_farther_one_in_either_order() {
         let draw = |order: [usize; 2]| {
-            let mut raster = Raster::new(camera());
-            let towards = raster.camera().axes()[2];
+            let mut raster = Raster::new(view());
+            let towards = raster.axes[2];
             for body in order {
                 let (centre, colour) = [(DVec3::ZERO, RED), (0.6 * towards, INK)][body];
                 raster.sphere(centre, 0.3, colour);
@@ -291,7 +329,7 @@ mod tests {
             raster.picture()
         };
         assert_eq!(draw([0, 1]), draw([1, 0]));
-        let at = camera().project(DVec3::ZERO).unwrap();
+        let at = view().project(DVec3::ZERO).unwrap();
         let [red, _, blue] = pixel(&draw([0, 1]), at);
         assert!(red < 120 && blue >= red, "the dark sphere is in front");
     }
@@ -301,7 +339,8 @@ mod tests {
         // A wall through a floor: on both sides of their common line the nearer one shows.
         let flat =
             |colour: Colour, points: [DVec3; 3]| points.map(|position| Vertex { position, normal: DVec3::Z, colour });
-        let mut raster = Raster::new(Camera::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], -DVec3::Y, [120, 120]));
+        let mut raster =
+            Raster::new(Viewpoint::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], -DVec3::Y, [120, 120]));
         let [v, w] = [DVec3::new(-2.0, -1.0, -1.0), DVec3::new(2.0, -1.0, -1.0)];
         raster.triangle(flat(RED, [v, w, DVec3::new(0.0, 3.0, 3.0)]), Finish::Flat);
         raster.triangle(
@@ -312,16 +351,16 @@ mod tests {
         for (z, nearer) in [(0.45, RED), (0.55, INK)] {
             // The red plane is y = z; the dark one y = 0.5.
             let front = DVec3::new(0.0, f64::min(z, 0.5), z);
-            let at = raster.camera().project(front).unwrap();
+            let at = raster.view().project(front).unwrap();
             assert_eq!(pixel(&picture, at), nearer.rgb, "height {z}");
         }
     }
 
     #[test]
     fn hostile_shapes_draw_nothing() {
-        let mut raster = Raster::new(camera());
+        let mut raster = Raster::new(view());
         let nan = DVec3::new(f64::NAN, 0.0, 0.0);
-        let far_behind = 1e9 * raster.camera().axes()[2];
+        let far_behind = 1e9 * raster.axes[2];
         for point in [nan, far_behind, DVec3::splat(f64::INFINITY)] {
             raster.sphere(point, 0.1, RED);
             raster.line([point, DVec3::ZERO], 2.0, INK, 0.0);

@@ -34,7 +34,7 @@ impl Raster {
 
     /// Flat triangles of any orientation: each is lit on the side that is seen.
     pub fn facets(&mut self, nodes: &[DVec3], triangles: &[[u32; 3]], colour: Colour) {
-        let [.., towards] = self.camera().axes();
+        let [.., towards] = self.axes;
         for triangle in triangles {
             let [Some(&a), Some(&b), Some(&c)] = triangle.map(|node| nodes.get(node as usize)) else { continue };
             let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -124,14 +124,14 @@ fn ring(axis: DVec3) -> [DVec3; FACETS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::raster::Camera;
+    use crate::draw::raster::Viewpoint;
 
     const BLUE: Colour = Colour::hex(0x20_50_c0);
 
     /// Share of the picture that is not white.
     fn covered(draw: impl FnOnce(&mut Raster)) -> f64 {
-        let camera = Camera::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], DVec3::new(1.0, -2.0, 0.8), [120, 120]);
-        let mut raster = Raster::new(camera);
+        let view = Viewpoint::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], DVec3::new(1.0, -2.0, 0.8), [120, 120]);
+        let mut raster = Raster::new(view);
         draw(&mut raster);
         let picture = raster.picture();
         picture.pixels.iter().filter(|&&pixel| pixel != [255; 3]).count() as f64 / picture.pixels.len() as f64

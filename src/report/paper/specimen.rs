@@ -11,7 +11,7 @@ use crate::{
         chart,
         colour::{self, Colour},
         plot,
-        raster::{Camera, Finish, Raster, Vertex},
+        raster::{Finish, Raster, Vertex, Viewpoint},
         ticks,
     },
     report::{PIXELS, object::draw_proxy},
@@ -78,7 +78,7 @@ fn picture(scanned: Scanned<'_>) -> Picture {
     framed.extend(joints.flat_map(|&joint| [joint - 2.0 * LINK, joint + 2.0 * LINK]));
     // From the front left above: the arm stands behind the block's near end, not before it.
     let direction = DVec3::new(0.45, -1.0, 0.6);
-    let mut raster = Raster::new(Camera::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize)));
+    let mut raster = Raster::new(Viewpoint::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize)));
     draw_block(&mut raster, &block);
     dots.into_iter().for_each(|dot| raster.sphere(dot, DOT, MEASURED));
     if let Some(pose) = &pressed {
