@@ -189,7 +189,7 @@ fn a_scene_of_a_former_algorithm_is_drawn_and_felt_but_not_solved() {
     let text = LEAST.replace("stiffness = 1000", "stiffness = 1000\nalgorithm = \"linearised\"\nupdates = 2");
     assert!(Rendering::parse(&text, "least.toml").is_ok());
     let text = text.replace("updates = 2", "");
-    assert!(parse(&text).unwrap_err().to_string().contains("take \"rest\""));
+    assert!(parse(&text).unwrap_err().to_string().contains("take geometry = \"rest\""));
 }
 
 #[test]
@@ -319,7 +319,12 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = 1000\nmax_iterations = 0", "max_iterations", &["at least 1"]),
     ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"magic\"", "magic", &["`energy`", "`paper`", "`rest`"]),
     ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised", "leave it out"]),
-    ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"linearised\"", "linearised", &["no more", "take \"rest\""]),
+    (
+        "stiffness = 1000",
+        "stiffness = 1000\nalgorithm = \"linearised\"",
+        "linearised",
+        &["no more", "take geometry = \"rest\""],
+    ),
     ("stiffness = 1000", "stiffness = 1000\ngeometry = \"energy\"", "\"energy\"", &["`rest`", "`following`"]),
     (
         "stiffness = 1000",

@@ -5,7 +5,8 @@
 //! time. Each is solved as a grid point is, from rest, and from those corners of its cell that predict a lower energy
 //! (`lowest.rs`). Errors are Euclidean norms over the joints; the force of a sliding joint counts with its lever arm.
 //!
-//! The same configurations tell whether the arm pushes through a part of the object within a cell.
+//! The same configurations tell whether the arm pushes through a part of the object within a cell, and where contact is
+//! with the surface at rest how far that is from contact with the deformed surface.
 //!
 //! An interpolation is formed of the whole grid where that has at most [`WHOLE`] points, else of the grid lines around
 //! each configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
@@ -19,10 +20,10 @@ use super::{
 use crate::{
     JointVector,
     contact::{Model, Solvers, Status},
-    dataset::{Dataset, Grid, InterpolationError, MeasuredError},
+    dataset::{Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
-    scene::Interpolation,
+    scene::{Algorithm, ContactSpec, Interpolation},
 };
 use rayon::prelude::*;
 use std::{
@@ -127,12 +128,32 @@ impl ErrorCheck<'_> {
             let errors = reference.distances(|q| found.next().unwrap_or(*q));
             Ok(InterpolationError::of(interpolation.name(), errors))
         });
-        let error = reference.measured(self.interpolation, errors.collect::<Result<_, FieldError>>()?);
+        let mut error = reference.measured(self.interpolation, errors.collect::<Result<_, FieldError>>()?);
+        error.geometry = self.geometry_error(&reference);
         let cells = places.par_iter().map(|place| {
             let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
             (place.q, corners.collect())
         });
         Ok(Some(Measured { error, notice: thin_parts::notice(self.model, 0.0, cells) }))
+    }
+
+    /// Returns what contact at rest, of which `reference` has the torques, leaves out; none by another law.
+    fn geometry_error(&self, reference: &Reference) -> Option<GeometryError> {
+        let contact = self.model.contact;
+        if contact.algorithm != Algorithm::Rest {
+            return None;
+        }
+        let mut following = self.model.with_contact(ContactSpec { algorithm: Algorithm::Energy, ..contact });
+        following.with_tangent = false;
+        let solvers = Solvers::new(&following, rayon::current_num_threads());
+        let solved = solvers.map(&reference.places, |solver, q| solver.solve(q));
+        let mut torques = solved.iter().map(|found| found.torque);
+        let distances = reference.distances(|q| torques.next().unwrap_or(*q));
+        let known = distances.iter().zip(&solved).filter(|(_, found)| !found.status.is_failed());
+        let (squares, count, depth) = known.fold((0.0, 0, 0.0_f64), |(squares, count, depth), (distance, found)| {
+            (squares + distance.powi(2), count + 1, depth.max(-found.gap))
+        });
+        Some(GeometryError { rms: (squares / f64::from(count.max(1))).sqrt(), depth })
     }
 }
 

@@ -192,6 +192,7 @@ impl Reference {
             lever_arm: self.norm.lever_arm,
             interpolation: interpolation.name().to_owned(),
             errors,
+            geometry: None,
         }
     }
 

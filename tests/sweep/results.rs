@@ -4,12 +4,13 @@ use crate::fixture::{Folder, MadeUp, POINTS, SCENE, answer, bake, scene, sweep, 
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, NodeForce, Status, Touch},
+    contact::{Equilibrium, Model, NodeForce, Solver, Status, Touch},
     dataset::Dataset,
+    fixtures::Random,
     object::Object,
     proxy::Chain,
-    scene::Scene,
-    sweep::{CpuBackend, FreeSpace, Run, Sweep},
+    scene::{Algorithm, ContactSpec, JointKind, LEVER_ARM, Scene},
+    sweep::{BackendChoice, Bake, CpuBackend, FreeSpace, Run, Sweep},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -68,6 +69,49 @@ fn a_sweep_in_memory_saves_the_same_file() {
         assert!(std::fs::read(folder.output()).unwrap() == saved);
         assert_eq!((report.iterations, report.max_residual), (in_memory.iterations, in_memory.max_residual));
     }
+}
+
+/// What the geometry at rest leaves out, stated with the error of a bake, beside other random configurations of the grid.
+#[test]
+fn the_error_of_the_geometry_at_rest_is_stated() {
+    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/mesh.toml")).unwrap();
+    let stated = |scene: &Scene| {
+        let (backend, stop) = (BackendChoice::Auto, AtomicBool::new(false));
+        let measured = Some(400);
+        let bake = Bake { scene, backend, measured, aim: None, date: "", stop: &stop, progress: &mut |_| () };
+        let (dataset, _) = bake.in_memory().unwrap();
+        (dataset.provenance.backend, dataset.provenance.error.unwrap())
+    };
+    scene.contact.algorithm = Algorithm::Rest;
+    // No GPU takes it.
+    let (backend, error) = stated(&scene);
+    let geometry = error.geometry.unwrap();
+    assert_eq!(backend, "cpu");
+
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let rest = Model::new(&object, &chain, scene.contact);
+    let following = rest.with_contact(ContactSpec { algorithm: Algorithm::Energy, ..scene.contact });
+    let (mut at_rest, mut deformed, mut random) = (Solver::new(&rest), Solver::new(&following), Random::new(4));
+    let (mut square, mut off, mut deepest) = (0.0, 0.0, 0.0_f64);
+    for _ in 0..1500 {
+        let axes = scene.grid.axes.iter();
+        let q: Vec<f64> =
+            axes.map(|axis| axis.start + random.between(0.0, axis.step * (axis.count - 1) as f64)).collect();
+        let (here, there) = (at_rest.solve(&q), deformed.solve(&q));
+        for ((a, b), joint) in here.torque.iter().zip(there.torque.iter()).zip(&chain.joints) {
+            let lever = if joint.kind == JointKind::Prismatic { LEVER_ARM } else { 1.0 };
+            square += (lever * a).powi(2);
+            off += (lever * (a - b)).powi(2);
+        }
+        deepest = deepest.max(-here.gap);
+    }
+    let (found, expected) = (geometry.rms / error.torque, (off / square).sqrt());
+    println!("{found} {expected}, {} {deepest}", geometry.depth);
+    assert!(found > 0.6 * expected && found < 1.6 * expected, "{found} {expected}");
+    assert!(geometry.depth > 0.7 * deepest && geometry.depth < 1.3 * deepest, "{} {deepest}", geometry.depth);
+
+    scene.contact.algorithm = Algorithm::Energy;
+    assert!(stated(&scene).1.geometry.is_none());
 }
 
 #[test]
