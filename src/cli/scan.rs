@@ -10,11 +10,12 @@ use super::{
 };
 use crate::{
     JointVector,
+    control::check_rate,
     dataset::replace_file,
     device::{Address, Guard, Key, Kind as DeviceKind, attach_joints, open},
     proxy::Chain,
     scan::{
-        LogHeader, LogWriter, Plan, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
+        LogHeader, LogWriter, Plan, RATE, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
         simulated::{Hand, SimulatedRig},
     },
     scene::ScanScene,
@@ -186,6 +187,10 @@ fn drive(
     let (key, input) = Key::new();
     let _keyboard = if course.guided.is_some() { Some(Keyboard::start(input)?) } else { None };
     let guard = Guard::new(open(address, None)?, None).map_err(|halt| format!("{address}: {halt}"))?;
+    if let Some(scheduler) = guard.scheduler() {
+        check_rate(scheduler.as_ref(), 1.0 / scene.scan.control.rate, RATE)
+            .map_err(|error| format!("{address}: {error}"))?;
+    }
     let header = header(scene, &chain, course, (guard.description(), address.kind == DeviceKind::Simulated));
     let (mut log, logged) = open_log(&header, output, course)?;
     // Last of all: the motors go on.

@@ -94,6 +94,8 @@ pub struct Paced {
 pub struct Deadlines {
     period: Duration,
     began: Duration,
+    /// Until when nobody waited for ticks.
+    rested: Duration,
     /// When the last tick began; none before the first.
     last: Option<Duration>,
     /// Number of the next deadline.
@@ -119,10 +121,7 @@ impl<'a> Clock<'a> {
     ) -> Result<Self, ClockError> {
         let deadlines = Deadlines::new(period).ok_or(ClockError::Memory)?;
         let Some(scheduler) = device.scheduler() else { return Ok(Self::RealTime(deadlines, patience)) };
-        let (device, scene) = (scheduler.rate(), 1.0 / period);
-        if (device - scene).abs() > SAME_RATE * scene {
-            return Err(ClockError::Rate { device, scene, place });
-        }
+        check_rate(scheduler.as_ref(), period, place)?;
         Ok(Self::Scheduled(deadlines, scheduler, patience))
     }
 
@@ -158,6 +157,7 @@ impl Deadlines {
         Some(Self {
             period: Duration::from_secs_f64(period),
             began: real_time::now(),
+            rested: Duration::ZERO,
             last: None,
             next: 0,
             lateness: Durations::new()?,
@@ -169,19 +169,20 @@ impl Deadlines {
     }
 
     /// Waits for the next deadline, and returns the tick that is due; none if nobody waits for one and none is due yet.
-    pub(super) fn wait(&self, patience: Patience) -> Option<Due> {
+    /// Those that became due while nobody waited are done first, whoever waits then.
+    pub(super) fn wait(&mut self, patience: Patience) -> Option<Due> {
         let deadline = self.deadline(self.next);
-        if patience != Patience::Rests {
-            let now = real_time::wait_until(deadline, patience == Patience::Spins);
-            return Some(Due { now, deadline, in_arrears: false });
-        }
-        let now = real_time::now();
-        if deadline > now {
+        if patience == Patience::Rests && deadline > self.rested {
             thread::park_timeout(REST);
-            return None;
+            self.rested = real_time::now();
         }
-        let in_arrears = now - deadline <= LONGEST_ARREARS;
-        Some(Due { now: if in_arrears { deadline } else { now }, deadline, in_arrears })
+        if deadline <= self.rested {
+            let in_arrears = self.rested - deadline <= LONGEST_ARREARS;
+            return Some(Due { now: if in_arrears { deadline } else { self.rested }, deadline, in_arrears });
+        }
+        let wait =
+            || Due { now: real_time::wait_until(deadline, patience == Patience::Spins), deadline, in_arrears: false };
+        (patience != Patience::Rests).then(wait)
     }
 
     /// Returns the tick that is due where somebody else calls: a period after the last one, or now, if that was less
@@ -221,6 +222,15 @@ impl Deadlines {
     fn deadline(&self, number: u64) -> Duration {
         self.began + times(self.period, number)
     }
+}
+
+/// Whether `scheduler` calls every `period` (s), which is set in `place`.
+///
+/// # Errors
+/// When it calls at another rate.
+pub fn check_rate(scheduler: &dyn Scheduler, period: f64, place: &'static str) -> Result<(), ClockError> {
+    let (device, scene) = (scheduler.rate(), 1.0 / period);
+    if (device - scene).abs() > SAME_RATE * scene { Err(ClockError::Rate { device, scene, place }) } else { Ok(()) }
 }
 
 /// `count` periods. Unlike `Duration * u32` it does not run out within a session of some weeks.

@@ -2,11 +2,13 @@
 //! holds what it can of that, and a sink takes the record. Sessions, replays, scans and the window differ in these four
 //! and in nothing else.
 
+mod check;
 mod clock;
 pub(crate) mod real_time;
 pub mod timing;
 
-pub use clock::{Clock, ClockError, LONGEST_ARREARS, Paced, Patience};
+pub use check::{CheckError, CheckReport, PUSH_SHARE, Phase, check};
+pub use clock::{Clock, ClockError, LONGEST_ARREARS, Paced, Patience, check_rate};
 use timing::Timing;
 
 use crate::{

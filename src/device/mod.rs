@@ -11,14 +11,12 @@
 //! | `guard`, `halt`, `key`, `tally` | the safety layer, its reasons, the dead-man key, counts |
 //! | `linear_map`, `joints`, `tip` | from a device's coordinates to the scene's joints |
 //! | `catalogue` | kinds of devices, by name |
-//! | `check` | the procedure of `haptize device check` |
 //! | `inverse3` | Haply Inverse3, through the maker's service |
 //! | `serial` | Haply 2DIY and WoodenHaptics |
 //! | `vendor` | Force Dimension and 3D Systems, through their makers' libraries |
 //! | `simulated` | a simulated device that fails on command |
 
 mod catalogue;
-mod check;
 mod guard;
 mod halt;
 mod hand;
@@ -37,7 +35,6 @@ mod tip;
 pub mod vendor;
 
 pub use catalogue::{Address, AddressError, Finding, Kind, OpenError, attach, attach_joints, open};
-pub use check::{CheckReport, PUSH_SHARE, Phase, check};
 pub use guard::{Guard, Held, LIMIT_SHARE, RAMP_TIME, RISE_TIME, WARM_TIME};
 pub use halt::{Clamps, Halt, LONGEST_AGE};
 pub use hardware::{Command, Coordinates, Hardware, Limits, Measurement, Scheduler, Watchdog};

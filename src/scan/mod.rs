@@ -70,6 +70,9 @@ pub enum ScanError {
     },
 }
 
+/// Where the rate of a scan is set.
+pub const RATE: &str = "[scan.control] of the scene";
+
 /// Measured rows that wait for the disk.
 const ROWS: usize = 256;
 
@@ -197,11 +200,7 @@ impl Session<'_> {
             }
         };
         let mut stopped = Vec::new();
-        let clock = if against_time {
-            Clock::of(self.device, period, "[scan.control] of the scene", &patience)?
-        } else {
-            Clock::Steps(period)
-        };
+        let clock = if against_time { Clock::of(self.device, period, RATE, &patience)? } else { Clock::Steps(period) };
         let mut driver = ControlLoop::of(controller, self.device);
         if against_time {
             let (mut rows, measured) = rtrb::RingBuffer::new(ROWS);
@@ -225,7 +224,7 @@ impl Session<'_> {
             None if stop.load(Ordering::Relaxed) => {
                 Err(ScanError::Rig("interrupted; --resume goes on after the last point in the log".into()))
             }
-            None => Err(ScanError::Rig(stopped.pop().unwrap_or_default())),
+            None => Err(ScanError::Rig(stopped.pop().unwrap_or_else(|| "the log takes too long to write".into()))),
             Some(End::Limit(point, limit)) => Err(ScanError::Limit { point, what: limit.text(spec, chain) }),
             Some(End::Halt(halt)) => Err(ScanError::Rig(halt.to_string())),
             Some(End::Reduced(torque, clamps)) => {
