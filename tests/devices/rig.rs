@@ -1,6 +1,7 @@
 //! A scan on a device, through the safety layer: what it measures is what the same rig measures without it.
 
 use crate::felt::{PERIOD, all};
+use assert_no_alloc::assert_no_alloc;
 use haptize::{
     JointVector,
     device::{
@@ -44,12 +45,13 @@ impl Device for Watched {
     }
 }
 
-/// A library that calls without a pause, whatever rate (Hz) it states.
+/// A library that calls without a pause, whatever rate (Hz) it states. It must not be kept waiting: a tick of a scan
+/// allocates nothing.
 struct Library(f64);
 
 impl Scheduler for Library {
     fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt> {
-        while tick() {}
+        while assert_no_alloc(&mut *tick) {}
         Ok(())
     }
 
