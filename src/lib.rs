@@ -89,9 +89,11 @@ pub mod ros;
 pub mod gridize;
 
 pub mod logs;
-pub mod scan;
 
 pub mod device;
+
+pub mod control;
+pub mod scan;
 
 pub mod render;
 

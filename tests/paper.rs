@@ -8,7 +8,7 @@ use haptize::{
     proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
     report::paper::{Comparison, Row, Scanned, Scans, Sphere, Value, procedure, specimen},
-    scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
+    scan::{LogHeader, LogWriter, Plan, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{Algorithm, PlanSpec, ScanScene, Scene, Waypoint},
     sweep::{SweepReport, baked},
 };
@@ -78,8 +78,16 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     };
     let mut log = LogWriter::create(&file, &header).unwrap();
     let stop = AtomicBool::new(false);
-    let mut session =
-        Session { spec: &part.scan, chain: &chain, rig: &mut rig, log: &mut log, stop: &stop, progress: &mut |_| {} };
+    let mut session = Session {
+        spec: &part.scan,
+        chain: &chain,
+        device: &mut rig,
+        against_time: false,
+        header: &header,
+        log: &mut log,
+        stop: &stop,
+        progress: &mut |_| {},
+    };
     assert!(session.scan(&plan, &[]).unwrap().whole);
     let samples = ScanLog::read(&file).unwrap().samples();
     let options =

@@ -14,7 +14,7 @@ use haptize::{
     proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
     report::force::EndForce,
-    scan::{LogHeader, LogWriter, Plan, Rig, ScanLog, Session, labels, simulated::SimulatedRig},
+    scan::{LogHeader, LogWriter, Plan, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{PlanSpec, ScanScene, Waypoint, WorkspacePlan},
 };
 use std::{path::PathBuf, sync::atomic::AtomicBool};
@@ -38,7 +38,7 @@ fn haptized(name: &str, part: impl FnOnce(&mut WorkspacePlan)) -> Dataset {
     let file = folder.path().join("log.csv");
     let header = LogHeader {
         rig: rig.description(),
-        simulated: rig.is_simulated(),
+        simulated: true,
         guided: false,
         joints: labels(&chain),
         scene: scene.text.clone(),
@@ -47,7 +47,9 @@ fn haptized(name: &str, part: impl FnOnce(&mut WorkspacePlan)) -> Dataset {
     let report = Session {
         spec: &scene.scan,
         chain: &chain,
-        rig: &mut rig,
+        device: &mut rig,
+        against_time: false,
+        header: &header,
         log: &mut log,
         stop: &AtomicBool::new(false),
         progress: &mut |_| {},

@@ -12,6 +12,7 @@ use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
     contact::Model,
+    control::{Clock, ClockError, LONGEST_ARREARS, Patience},
     dataset::{Dataset, Provenance},
     device::{Applied, Device, Halt, HandError, Motion, Pointer, Reading, Scheduler, SimulatedHand},
     field::TorqueField,
@@ -21,9 +22,9 @@ use haptize::{
         graphics::Graphics,
         haptic::{Haptics, Inputs},
         live::{Followed, Live, LiveEnds},
-        realtime::{self, Ends, HapticLoop, Options},
+        realtime::{self, Ends, Options, RATE, Recorder},
         recording::Recording,
-        session::{Driver, Plan, SessionError},
+        session::{Driver, Plan},
         setup::{Setup, labels},
     },
     scene::{
@@ -39,7 +40,7 @@ use haptize::{
 use std::{
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicU64, Ordering},
     },
     time::{Duration, Instant},
 };
@@ -99,15 +100,22 @@ fn the_real_time_loop_allocates_nothing() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut ticks, mut latest, clear, .. }) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
+    let goes_on = || Some(Patience::Spins);
+    let mut clock = Clock::of(&hand, haptics.period(), RATE, &goes_on).unwrap();
+    let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
+    let (mut recorder, Ends { mut ticks, mut latest }) = Recorder::new(3);
+    let (clear, mut count) = (driver.controller.clear(), 0);
     assert_no_alloc(|| {
-        for k in 0..300 {
-            body.tick();
-            if k == 150 {
+        driver.pace(&mut clock, &mut |_, record, paced| {
+            recorder.take(record, paced);
+            count += 1;
+            if count == 150 {
                 clear.ask();
             }
-        }
+            count < 300
+        })
     });
+    assert_eq!(count, 300);
     let mut last = None;
     while let Ok(tick) = ticks.pop() {
         last = Some(tick);
@@ -115,7 +123,6 @@ fn the_real_time_loop_allocates_nothing() {
     assert_eq!(latest.read().proxy, last.unwrap().proxy);
 }
 
-/// While a simulated hand is still nobody waits for ticks: they are all there afterwards, a period apart.
 /// A device whose maker's library calls the loop, at a rate of its own.
 struct Called {
     hand: SimulatedHand,
@@ -160,42 +167,57 @@ fn a_maker_s_library_that_calls_at_another_rate_is_refused_and_the_last_torque_o
     let rate = 1.0 / haptics.period();
     let called = |rate: f64, last: &Arc<Mutex<f64>>| Called { hand: hand(1), rate, last: Arc::clone(last) };
     let last = Arc::new(Mutex::new(0.0));
+    let always = || Some(Patience::Spins);
     for other in [0.5 * rate, 2.0 * rate, 1.001 * rate] {
-        let refused = HapticLoop::new(&haptics, &mut called(other, &last), None).err().unwrap();
-        assert!(matches!(refused, SessionError::Rate { device, .. } if device == other), "{refused}");
-        assert!(refused.to_string().contains(&format!("rate = {other}")), "{refused}");
+        let refused = Clock::of(&called(other, &last), haptics.period(), RATE, &always).err().unwrap();
+        assert!(matches!(refused, ClockError::Rate { device, .. } if device == other), "{refused}");
+        assert!(refused.to_string().contains(&format!("rate = {other} in [haptics]")), "{refused}");
+        let mut device = called(other, &last);
+        let plan = Plan::new(Vec::new(), haptics.period(), 0.1, 0);
+        assert!(realtime::run(&haptics, &mut device, None, &plan, Options::default()).is_err());
     }
     let mut device = called(rate, &last);
-    let scheduler = device.scheduler().unwrap();
-    let (mut body, _ends) = HapticLoop::new(&haptics, &mut device, None).unwrap();
+    let clock = Clock::of(&device, haptics.period(), RATE, &always).unwrap();
+    let mut driver = Driver::new(&haptics, &mut device, None).unwrap();
     // Into the object, and no farther.
-    let (most, pushed) = (Instant::now() + Duration::from_secs(20), AtomicBool::new(false));
-    let refused = body.called_by(scheduler.as_ref(), |_| {
-        pushed.fetch_or(*last.lock().unwrap() > 0.0, Ordering::Relaxed);
-        !pushed.load(Ordering::Relaxed) && Instant::now() < most
+    let (most, mut pushed) = (Instant::now() + Duration::from_secs(20), false);
+    let timing = driver.run(clock, |_, _, _| {
+        pushed |= *last.lock().unwrap() > 0.0;
+        !pushed && Instant::now() < most
     });
-    assert!(refused.is_empty() && pushed.into_inner(), "{refused:?}");
+    assert!(timing.refused.is_empty() && pushed, "{timing:?}");
     assert_eq!(*last.lock().unwrap(), 0.0);
 }
 
+/// While a simulated hand is still nobody waits for ticks: they are all there afterwards, a period apart.
 #[test]
 fn no_tick_is_missed_that_is_done_in_arrears() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, Ends { mut ticks, .. }) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
-    body.tick_relaxed();
-    let mut waited = Duration::ZERO;
-    assert_no_alloc(|| {
-        for _ in 0..5 {
-            body.tick_in_arrears(|| {
-                let begin = Instant::now();
-                std::thread::sleep(Duration::from_millis(20));
-                waited = waited.max(begin.elapsed());
-            });
+    // The first tick is waited for, and the last one.
+    let (done, waited) = (AtomicU64::new(0), AtomicU64::new(0));
+    let begin = Instant::now();
+    let looked = AtomicU64::new(0);
+    let patience = || {
+        let now = begin.elapsed().as_nanos() as u64;
+        waited.fetch_max(now - looked.swap(now, Ordering::Relaxed), Ordering::Relaxed);
+        match done.load(Ordering::Relaxed) {
+            0 => Some(Patience::Sleeps),
+            1..100 => Some(Patience::Rests),
+            _ => Some(Patience::Sleeps),
         }
-        body.tick_relaxed();
+    };
+    let mut clock = Clock::of(&hand, haptics.period(), RATE, &patience).unwrap();
+    let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
+    let (mut recorder, Ends { mut ticks, .. }) = Recorder::new(3);
+    assert_no_alloc(|| {
+        driver.pace(&mut clock, &mut |_, record, paced| {
+            recorder.take(record, paced);
+            done.fetch_add(1, Ordering::Relaxed) < 100 || paced.in_arrears
+        })
     });
+    let waited = Duration::from_nanos(waited.into_inner());
     let (mut elapsed, mut marked) = (Vec::new(), Vec::new());
     while let Ok(tick) = ticks.pop() {
         elapsed.push(tick.inputs.elapsed);
@@ -204,14 +226,14 @@ fn no_tick_is_missed_that_is_done_in_arrears() {
     let period = haptics.period();
     // The first tick has no other before it; the next, and the one that is waited for, follow those that were late.
     let between = &elapsed[2..elapsed.len() - 1];
-    if waited < HapticLoop::ARREARS {
+    if waited < LONGEST_ARREARS {
         assert!(between.len() >= 95 && between.iter().all(|elapsed| *elapsed == period), "{between:?}");
         // By what was done and not by a clock: an ordinary tick may take a period to the nanosecond, too.
         let waited_for = [0, marked.len() - 1];
         assert!(marked.iter().enumerate().all(|(k, marked)| *marked != waited_for.contains(&k)), "{marked:?}");
     } else {
         // The machine stood still for longer than ticks are done afterwards: no figure of it says anything.
-        println!("skipped: {waited:?} for a wait of 20 ms");
+        println!("skipped: {waited:?} for a wait of 25 ms");
     }
 }
 
@@ -315,13 +337,15 @@ fn the_first_deadline_comes_after_the_system_has_granted_what_it_grants() {
     let data = object(3);
     let haptics = build(&data);
     let mut hand = hand(3);
-    let (mut body, _ends) = HapticLoop::new(&haptics, &mut hand, None).unwrap();
+    let goes_on = || Some(Patience::Spins);
+    let mut clock = Clock::of(&hand, haptics.period(), RATE, &goes_on).unwrap();
+    let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
     // As long as memory may take to be locked.
     std::thread::sleep(Duration::from_millis(200));
-    body.begin();
-    body.tick();
+    clock.begin();
+    driver.pace(&mut clock, &mut |_, _, _| false);
+    let lateness = clock.timing(Vec::new()).lateness;
     // A busy machine makes the tick late, too, by far less.
-    let lateness = body.lateness();
     assert!(lateness.count == 1 && lateness.max < 150e3, "{lateness:?}");
 }
 

@@ -1,12 +1,14 @@
 //! `haptize device`: which real devices this machine has, and a careful first run of one.
 
 use super::{Failure, Report, interrupt, keyboard::Keyboard, tell};
-use crate::device::{Address, CheckReport, Guard, Key, Kind, LIMIT_SHARE, PUSH_SHARE, Phase, Watchdog, check, open};
+use crate::{
+    control::{CheckReport, PUSH_SHARE, Phase, check},
+    device::{Address, Guard, Key, Kind, LIMIT_SHARE, Watchdog, open},
+};
 use serde_json::json;
 use std::{
     fmt::{self, Write},
     sync::atomic::Ordering,
-    time::{Duration, Instant},
 };
 
 /// Arguments of `device`.
@@ -45,9 +47,6 @@ struct Check {
 
 /// Longest phase (s).
 const LONGEST: f64 = 600.0;
-
-/// Time between ticks.
-const PERIOD: Duration = Duration::from_millis(1);
 
 /// Lists or checks devices.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
@@ -94,18 +93,8 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
     let mut reports = Vec::new();
     for phase in phases {
         tell(format_args!("haptize: {}", instruction(*phase)));
-        let mut last = Instant::now();
-        let mut due = last;
-        let mut tick = || {
-            due += PERIOD;
-            std::thread::sleep(due.saturating_duration_since(Instant::now()));
-            let now = Instant::now();
-            due = due.max(now - PERIOD);
-            let elapsed = now - std::mem::replace(&mut last, now);
-            (!stop.load(Ordering::Relaxed)).then_some(elapsed.as_secs_f64())
-        };
-        let report = check(&mut guard, *phase, arguments.seconds, &mut tick)
-            .map_err(|halt| format!("{}: {halt}", arguments.device))?;
+        let report = check(&mut guard, *phase, arguments.seconds, stop)
+            .map_err(|error| format!("{}: {error}", arguments.device))?;
         let ended = report.tally.stopped.is_some() || stop.load(Ordering::Relaxed);
         reports.push(report);
         if ended {

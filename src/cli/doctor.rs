@@ -201,7 +201,7 @@ fn writing() -> Finding {
 /// May a thread of this process run with the priority of the haptic loop? Tried on a thread that ends at once.
 #[cfg(target_os = "linux")]
 fn scheduling() -> Finding {
-    let asking = thread::Builder::new().spawn(|| crate::render::clock::raise_priority().is_ok());
+    let asking = thread::Builder::new().spawn(|| crate::control::real_time::raise_priority().is_ok());
     let permitted = asking.is_ok_and(|thread| thread.join().unwrap_or(false));
     Finding {
         subject: "real-time scheduling",

@@ -10,11 +10,12 @@ use super::{
 };
 use crate::{
     JointVector,
+    control::check_rate,
     dataset::replace_file,
-    device::{Address, DeviceRig, Guard, Key, Kind as DeviceKind, attach_joints, open, with_scheduler},
+    device::{Address, Guard, Key, Kind as DeviceKind, attach_joints, open},
     proxy::Chain,
     scan::{
-        LogHeader, LogWriter, Plan, Rig, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
+        LogHeader, LogWriter, Plan, RATE, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
         simulated::{Hand, SimulatedRig},
     },
     scene::ScanScene,
@@ -22,8 +23,6 @@ use crate::{
 use std::{
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
-    thread,
-    time::{Duration, Instant},
 };
 
 /// Arguments of `haptize scan`.
@@ -160,18 +159,19 @@ pub fn measure(
     output: &Path,
     course: Course,
     stop: &AtomicBool,
-    progress: &mut dyn FnMut(ScanProgress),
+    progress: &mut (dyn FnMut(ScanProgress) + Send),
 ) -> Result<ScanReport, Failure> {
     let (chain, plan) = planned(scene)?;
     let first = plan.stops.first().map_or_else(|| JointVector::zeros(chain.joints.len()), |stop| stop.q);
     let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, SEED);
-    let (mut log, logged) = open_log(scene, &chain, output, course, &rig)?;
+    let header = header(scene, &chain, course, (rig.description(), true));
+    let (mut log, logged) = open_log(&header, output, course)?;
     if let Some(seconds) = course.guided {
         rig = rig.led_by(Hand::new(plan.spread(logged.len(), Hand::visits_within(seconds))));
     }
-    tell(format_args!("haptize: {}", rig.description()));
-    let session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
-    go(session, course, &plan, &logged)
+    let (spec, chain, header, log) = (&scene.scan, &chain, &header, &mut log);
+    let device = &mut rig;
+    go(Session { spec, chain, device, against_time: false, header, log, stop, progress }, course, &plan, &logged)
 }
 
 /// Scans `scene` with the device at `address` into the log `output`, until it is done or `stop` is raised.
@@ -181,49 +181,23 @@ fn drive(
     course: Course,
     address: &Address,
     stop: &AtomicBool,
-    progress: &mut dyn FnMut(ScanProgress),
+    progress: &mut (dyn FnMut(ScanProgress) + Send),
 ) -> Result<ScanReport, Failure> {
     let (chain, plan) = planned(scene)?;
     let (key, input) = Key::new();
     let _keyboard = if course.guided.is_some() { Some(Keyboard::start(input)?) } else { None };
     let guard = Guard::new(open(address, None)?, None).map_err(|halt| format!("{address}: {halt}"))?;
-    let scheduler = guard.scheduler();
-    let (rate, most) =
-        (scene.scan.control.rate, scheduler.as_ref().map_or(f64::INFINITY, |scheduler| scheduler.rate()));
-    if rate > most {
-        return Err(format!(
-            "{address}: its maker's library calls {most} times a second: give [scan.control] a rate of {most} Hz or \
-             less, not {rate}"
-        )
-        .into());
+    if let Some(scheduler) = guard.scheduler() {
+        check_rate(scheduler.as_ref(), 1.0 / scene.scan.control.rate, RATE)
+            .map_err(|error| format!("{address}: {error}"))?;
     }
-    let description = guard.description();
+    let header = header(scene, &chain, course, (guard.description(), address.kind == DeviceKind::Simulated));
+    let (mut log, logged) = open_log(&header, output, course)?;
+    // Last of all: the motors go on.
     let device = attach_joints(guard, address, chain.degrees_of_freedom(), &scene.device)?;
-    let hand = course.guided.map(|_| key);
-    let simulated = address.kind == DeviceKind::Simulated;
-    let mut scan = |mut rig: DeviceRig<'_>| -> Result<ScanReport, Failure> {
-        let (mut log, logged) = open_log(scene, &chain, output, course, &rig)?;
-        tell(format_args!("haptize: {}", rig.description()));
-        let session = Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop, progress };
-        go(session, course, &plan, &logged)
-    };
-    match scheduler {
-        Some(scheduler) => with_scheduler(device, scheduler.as_ref(), |device, mut wait| {
-            scan(DeviceRig::new(device, description, simulated, hand, stop, move |period| wait.wait(period)))
-        })?,
-        None => scan(DeviceRig::new(device, description, simulated, hand, stop, against_the_clock())),
-    }
-}
-
-/// Returns what waits until so many seconds after the last call, and returns how many there were.
-fn against_the_clock() -> impl FnMut(f64) -> f64 {
-    let mut last = Instant::now();
-    move |period: f64| {
-        let due = last + Duration::from_secs_f64(period);
-        thread::sleep(due.saturating_duration_since(Instant::now()));
-        let now = Instant::now();
-        (now - std::mem::replace(&mut last, now)).as_secs_f64()
-    }
+    let device = &mut device.led_by(course.guided.map(|_| key));
+    let (spec, chain, header, log) = (&scene.scan, &chain, &header, &mut log);
+    go(Session { spec, chain, device, against_time: true, header, log, stop, progress }, course, &plan, &logged)
 }
 
 /// The arm of `scene`, and where it goes.
@@ -233,25 +207,20 @@ fn planned(scene: &ScanScene) -> Result<(Chain, Plan), Failure> {
     Ok((chain, plan))
 }
 
-/// Begins or continues the log of a scan with `rig`; the rows that it holds.
-fn open_log(
-    scene: &ScanScene,
-    chain: &Chain,
-    output: &Path,
-    course: Course,
-    rig: &dyn Rig,
-) -> Result<(LogWriter, Vec<ScanRow>), Failure> {
-    let header = LogHeader {
-        rig: rig.description(),
-        simulated: rig.is_simulated(),
-        guided: course.guided.is_some(),
-        joints: labels(chain),
-        scene: scene.text.clone(),
+/// What the log of a scan says of it and of the rig, whose description this is; whether that is simulated.
+fn header(scene: &ScanScene, chain: &Chain, course: Course, (rig, simulated): (String, bool)) -> LogHeader {
+    LogHeader { rig, simulated, guided: course.guided.is_some(), joints: labels(chain), scene: scene.text.clone() }
+}
+
+/// Begins or continues a log, and tells of its rig; the rows that it holds.
+fn open_log(header: &LogHeader, output: &Path, course: Course) -> Result<(LogWriter, Vec<ScanRow>), Failure> {
+    let opened = if course.resume {
+        LogWriter::resume(output, header)?
+    } else {
+        (LogWriter::create(output, header)?, Vec::new())
     };
-    if course.resume {
-        return Ok(LogWriter::resume(output, &header)?);
-    }
-    Ok((LogWriter::create(output, &header)?, Vec::new()))
+    tell(format_args!("haptize: {}", header.rig));
+    Ok(opened)
 }
 
 fn go(mut session: Session<'_>, course: Course, plan: &Plan, logged: &[ScanRow]) -> Result<ScanReport, Failure> {

@@ -140,11 +140,6 @@ impl Guard {
         self.stopped.map_or(Ok(()), Err)
     }
 
-    /// Lets efforts rise from zero again, as after each interruption.
-    pub fn interrupt(&mut self) {
-        self.ramp = 0.0;
-    }
-
     /// Returns what calls the loop, if the device owns the thread in which it may be driven.
     #[must_use]
     pub fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {

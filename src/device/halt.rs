@@ -40,9 +40,6 @@ pub enum Halt {
     /// The loop asks for a torque that is not a number.
     #[error("the torque that was asked for is not a number")]
     NotFinite,
-    /// The program that drives the device in another thread gave no torque for [`super::STALE_COMMAND`].
-    #[error("the program gave no new torque for 10 ms: end other programs that keep the machine busy")]
-    Late,
     /// The session is over.
     #[error("the session is over")]
     Over,
@@ -53,7 +50,7 @@ impl Halt {
     /// zero, when they are gone.
     #[must_use]
     pub fn is_final(self) -> bool {
-        !matches!(self, Self::Stale | Self::KeyReleased | Self::NotReady | Self::Late)
+        !matches!(self, Self::Stale | Self::KeyReleased | Self::NotReady)
     }
 }
 

@@ -75,7 +75,7 @@ impl Device for SimulatedHand {
         let (goal, velocity) = self.motion.at(self.time + 0.5 * elapsed);
         self.arm.step(&goal, &velocity, elapsed);
         self.time += elapsed;
-        Reading { position: *self.arm.position(), age: 0.0, hand: self.motion.at(self.time).0 }
+        Reading { hand: self.motion.at(self.time).0, ..Reading::at(*self.arm.position()) }
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {

@@ -1,6 +1,6 @@
 //! A device whose joints are those of the scene, through a linear map.
 
-use super::{Applied, Device, Guard, LinearMap, Reading, Scheduler};
+use super::{Applied, Device, Guard, Key, LinearMap, Reading, Scheduler};
 use crate::JointVector;
 use std::sync::Arc;
 
@@ -8,18 +8,21 @@ use std::sync::Arc;
 pub struct JointDevice {
     guard: Guard,
     map: LinearMap,
+    /// Says that a hand holds the device.
+    hand: Option<Key>,
 }
 
 impl JointDevice {
     /// Returns the device of `guard`; `map` must have as many coordinates.
     #[must_use]
     pub fn new(guard: Guard, map: LinearMap) -> Self {
-        Self { guard, map }
+        Self { guard, map, hand: None }
     }
 
-    /// Lets torques rise from zero again, as after each interruption.
-    pub fn interrupt(&mut self) {
-        self.guard.interrupt();
+    /// Returns the same device, which a hand is taken to hold while `key` is held.
+    #[must_use]
+    pub fn led_by(self, key: Option<Key>) -> Self {
+        Self { hand: key, ..self }
     }
 }
 
@@ -27,7 +30,11 @@ impl Device for JointDevice {
     fn read(&mut self, elapsed: f64) -> Reading {
         let measured = self.guard.read(elapsed);
         let position = self.map.position(&measured.position);
-        Reading { position, age: measured.age, hand: position }
+        let held = self.hand.as_mut().is_some_and(|key| {
+            key.pass(elapsed);
+            key.is_held()
+        });
+        Reading { age: measured.age, held, ..Reading::at(position) }
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {

@@ -10,17 +10,13 @@
 //! | `hardware` | what a protocol implements |
 //! | `guard`, `halt`, `key`, `tally` | the safety layer, its reasons, the dead-man key, counts |
 //! | `linear_map`, `joints`, `tip` | from a device's coordinates to the scene's joints |
-//! | `rig` | a device as the rig of a scan |
-//! | `relay` | the same where the maker's library owns the thread |
 //! | `catalogue` | kinds of devices, by name |
-//! | `check` | the procedure of `haptize device check` |
 //! | `inverse3` | Haply Inverse3, through the maker's service |
 //! | `serial` | Haply 2DIY and WoodenHaptics |
 //! | `vendor` | Force Dimension and 3D Systems, through their makers' libraries |
 //! | `simulated` | a simulated device that fails on command |
 
 mod catalogue;
-mod check;
 mod guard;
 mod halt;
 mod hand;
@@ -32,8 +28,6 @@ mod linear_map;
 mod motion;
 mod pointer;
 mod recorded;
-mod relay;
-mod rig;
 pub mod serial;
 mod simulated;
 mod tally;
@@ -41,7 +35,6 @@ mod tip;
 pub mod vendor;
 
 pub use catalogue::{Address, AddressError, Finding, Kind, OpenError, attach, attach_joints, open};
-pub use check::{CheckReport, PUSH_SHARE, Phase, check};
 pub use guard::{Guard, Held, LIMIT_SHARE, RAMP_TIME, RISE_TIME, WARM_TIME};
 pub use halt::{Clamps, Halt, LONGEST_AGE};
 pub use hardware::{Command, Coordinates, Hardware, Limits, Measurement, Scheduler, Watchdog};
@@ -57,8 +50,6 @@ pub use hand::{HandError, SimulatedHand};
 pub use motion::{Motion, MotionError};
 pub use pointer::{Pointer, PointerInput};
 pub use recorded::Recorded;
-pub use relay::{Relayed, Ticker, Wait, relay, with_scheduler};
-pub use rig::DeviceRig;
 
 use crate::JointVector;
 use std::sync::Arc;
@@ -106,4 +97,15 @@ pub struct Reading {
     pub age: f64,
     /// Where the hand wants the device, if that is known; else the position (rad or m).
     pub hand: JointVector,
+    /// Whether a hand holds a device that is scanned with: a button on its handle. What is read meanwhile is not the
+    /// object's torque alone. False where there is no such button.
+    pub held: bool,
+}
+
+impl Reading {
+    /// A reading of `position` (rad or m) as it is now, of a device without a button.
+    #[must_use]
+    pub fn at(position: JointVector) -> Self {
+        Self { position, age: 0.0, hand: position, held: false }
+    }
 }

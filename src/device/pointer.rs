@@ -50,7 +50,7 @@ impl Device for Pointer {
     fn read(&mut self, elapsed: f64) -> Reading {
         let goal = *self.goal.read();
         self.arm.step(&goal, &JointVector::zeros(goal.len()), elapsed);
-        Reading { position: *self.arm.position(), age: 0.0, hand: goal }
+        Reading { hand: goal, ..Reading::at(*self.arm.position()) }
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {

@@ -21,8 +21,7 @@ impl Recorded {
 impl Device for Recorded {
     fn read(&mut self, elapsed: f64) -> Reading {
         self.time += elapsed;
-        let position = self.motion.at(self.time).0;
-        Reading { position, age: 0.0, hand: position }
+        Reading::at(self.motion.at(self.time).0)
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {

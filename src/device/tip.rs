@@ -131,7 +131,7 @@ impl Device for TipDevice {
             self.step(elapsed);
         }
         self.tip = tip;
-        Reading { position: self.position, age: measured.age, hand: self.position }
+        Reading { age: measured.age, ..Reading::at(self.position) }
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {

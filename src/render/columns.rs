@@ -4,123 +4,113 @@ use super::trace::Tick;
 use crate::{JointVector, csv::Table, dataset::JointLabel, field::Flags};
 use std::io::{self, Write};
 
-/// A column of a table of ticks, or one column for each joint.
-pub(super) struct Column {
-    /// Its name, with its unit unless that is a joint's.
-    name: &'static str,
-    unit: Unit,
-    /// Where a tick holds it.
-    cell: fn(&mut Tick) -> Cell<'_>,
-}
-
-/// The unit of a column.
-enum Unit {
-    /// In its name.
-    Named,
-    /// Of the joint's coordinate.
-    Position,
-    /// Of the joint's effort.
-    Effort,
-}
+/// A column of a table of ticks, or one column for each joint: its name, with its unit unless that is a joint's, and
+/// where a tick holds it.
+pub(super) type TickColumn = (&'static str, fn(&mut Tick) -> Cell<'_>);
 
 /// The content of a column in one row.
-enum Cell<'tick> {
+pub(super) enum Cell<'tick> {
     Number(&'tick mut f64),
     Count(&'tick mut u32),
     /// 0 or 1.
     Switch(&'tick mut bool),
     /// As the number of their bits.
     Remarks(&'tick mut Flags),
-    /// A field for each joint, all empty where the tick has no such vector.
-    Vector(&'tick mut JointVector),
+    /// A coordinate of each joint, all empty where the tick has no such vector.
+    Positions(&'tick mut JointVector),
+    /// The same of efforts.
+    Efforts(&'tick mut JointVector),
     /// Written, and never read.
     Text(String),
 }
 
-use Cell::{Count, Number, Remarks, Switch, Text, Vector};
-use Unit::{Effort, Named, Position};
-
-const fn column(name: &'static str, unit: Unit, cell: fn(&mut Tick) -> Cell<'_>) -> Column {
-    Column { name, unit, cell }
-}
+use Cell::{Count, Efforts, Number, Positions, Remarks, Switch, Text};
 
 /// Columns of a trace. Those of the energy accounts follow ([`Accounts::named`](super::accounts::Accounts::named)).
-pub(super) const TRACED: &[Column] = &[
-    column("time [s]", Named, |tick| Number(&mut tick.time)),
-    column("hand", Position, |tick| Vector(&mut tick.hand)),
-    column("device", Position, |tick| Vector(&mut tick.device)),
-    column("proxy", Position, |tick| Vector(&mut tick.proxy)),
-    column("device torque", Effort, |tick| Vector(&mut tick.device_torque)),
-    column("held torque", Effort, |tick| Vector(&mut tick.applied.torque)),
-    column("contact torque", Effort, |tick| Vector(&mut tick.sample.torque)),
-    column("contact index", Named, |tick| Number(&mut tick.sample.index)),
-    column("contact", Named, |tick| Switch(&mut tick.sample.contact)),
-    column("contact nodes", Named, |tick| Count(&mut tick.sample.contact_nodes)),
-    column("flags", Named, |tick| Remarks(&mut tick.flags)),
-    column("fault", Named, |tick| Text(tick.fault.map_or_else(String::new, |fault| fault.to_string()))),
-    column("clamps", Named, |tick| Text(tick.applied.clamps.bits().to_string())),
-    column("halt", Named, |tick| Text(tick.applied.halt.map_or_else(String::new, |halt| halt.to_string()))),
+pub(super) const TRACED: &[TickColumn] = &[
+    ("time [s]", |tick| Number(&mut tick.time)),
+    ("hand", |tick| Positions(&mut tick.hand)),
+    ("device", |tick| Positions(&mut tick.device)),
+    ("proxy", |tick| Positions(&mut tick.proxy)),
+    ("device torque", |tick| Efforts(&mut tick.device_torque)),
+    ("held torque", |tick| Efforts(&mut tick.applied.torque)),
+    ("contact torque", |tick| Efforts(&mut tick.sample.torque)),
+    ("contact index", |tick| Number(&mut tick.sample.index)),
+    ("contact", |tick| Switch(&mut tick.sample.contact)),
+    ("contact nodes", |tick| Count(&mut tick.sample.contact_nodes)),
+    ("flags", |tick| Remarks(&mut tick.flags)),
+    ("fault", |tick| Text(tick.fault.map_or_else(String::new, |fault| fault.to_string()))),
+    ("clamps", |tick| Text(tick.applied.clamps.bits().to_string())),
+    ("halt", |tick| Text(tick.applied.halt.map_or_else(String::new, |halt| halt.to_string()))),
 ];
 
 /// Columns of a recording: inputs, then answers; then what the device held, which old files lack.
-pub(super) const RECORDED: &[Column] = &[
-    column("elapsed [s]", Named, |tick| Number(&mut tick.inputs.elapsed)),
-    column("interval [s]", Named, |tick| Number(&mut tick.inputs.interval)),
-    column("age [s]", Named, |tick| Number(&mut tick.inputs.age)),
-    column("restart", Named, |tick| Switch(&mut tick.restart)),
-    column("frames", Named, |tick| Count(&mut tick.frames)),
-    column("position", Position, |tick| Vector(&mut tick.inputs.position)),
-    column("hand", Position, |tick| Vector(&mut tick.hand)),
-    column("torque", Effort, |tick| Vector(&mut tick.device_torque)),
-    column("proxy", Position, |tick| Vector(&mut tick.proxy)),
-    column("held", Effort, |tick| Vector(&mut tick.applied.torque)),
+pub(super) const RECORDED: &[TickColumn] = &[
+    ("elapsed [s]", |tick| Number(&mut tick.inputs.elapsed)),
+    ("interval [s]", |tick| Number(&mut tick.inputs.interval)),
+    ("age [s]", |tick| Number(&mut tick.inputs.age)),
+    ("restart", |tick| Switch(&mut tick.restart)),
+    ("frames", |tick| Count(&mut tick.frames)),
+    ("position", |tick| Positions(&mut tick.inputs.position)),
+    ("hand", |tick| Positions(&mut tick.hand)),
+    ("torque", |tick| Efforts(&mut tick.device_torque)),
+    ("proxy", |tick| Positions(&mut tick.proxy)),
+    ("held", |tick| Efforts(&mut tick.applied.torque)),
 ];
 
 /// Further columns of a recording whose contact was solved meanwhile, and would be solved otherwise another time.
-pub(super) const FELT: &[Column] = &[
-    column("contact torque", Effort, |tick| Vector(&mut tick.sample.torque)),
-    column("contact index", Named, |tick| Number(&mut tick.sample.index)),
-    column("contact", Named, |tick| Switch(&mut tick.sample.contact)),
-    column("contact nodes", Named, |tick| Count(&mut tick.sample.contact_nodes)),
-    column("energy [J]", Named, |tick| Number(&mut tick.sample.energy)),
-    column("share", Named, |tick| Number(&mut tick.sample.share)),
-    column("remarks", Named, |tick| Remarks(&mut tick.sample.flags)),
+pub(super) const FELT: &[TickColumn] = &[
+    ("contact torque", |tick| Efforts(&mut tick.sample.torque)),
+    ("contact index", |tick| Number(&mut tick.sample.index)),
+    ("contact", |tick| Switch(&mut tick.sample.contact)),
+    ("contact nodes", |tick| Count(&mut tick.sample.contact_nodes)),
+    ("energy [J]", |tick| Number(&mut tick.sample.energy)),
+    ("share", |tick| Number(&mut tick.sample.share)),
+    ("remarks", |tick| Remarks(&mut tick.sample.flags)),
 ];
 
 /// Number of fields of a row of `columns` for so many `joints`.
-pub(super) fn width(columns: &[Column], joints: usize) -> usize {
-    columns.iter().map(|column| column.width(joints)).sum()
+pub(super) fn width(columns: &[TickColumn], joints: usize) -> usize {
+    let mut any = Tick::default();
+    columns.iter().map(|(_, cell)| cell(&mut any).width(joints)).sum()
 }
 
-impl Column {
-    fn width(&self, joints: usize) -> usize {
-        match self.unit {
-            Named => 1,
-            Position | Effort => joints,
-        }
-    }
-
-    /// Appends its headings.
-    pub fn head<W: Write>(&self, joints: &[JointLabel], table: &mut Table<W>) -> io::Result<()> {
-        match self.unit {
-            Named => table.field(self.name),
-            Position => table.fields(joints.iter().map(|joint| joint.heading(self.name))),
-            Effort => table.fields(joints.iter().map(|joint| joint.effort_heading(self.name))),
+/// Appends the headings of `columns`.
+pub(super) fn head<W: Write>(columns: &[TickColumn], joints: &[JointLabel], table: &mut Table<W>) -> io::Result<()> {
+    let mut any = Tick::default();
+    columns.iter().try_for_each(|(name, cell)| {
+        match cell(&mut any) {
+            Positions(_) => table.fields(joints.iter().map(|joint| joint.heading(name))),
+            Efforts(_) => table.fields(joints.iter().map(|joint| joint.effort_heading(name))),
+            _ => table.field(name),
         }
         .map(drop)
-    }
+    })
+}
 
-    /// Appends its fields of `tick`, which this does not change.
-    pub fn write<W: Write>(&self, tick: &mut Tick, joints: usize, table: &mut Table<W>) -> io::Result<()> {
-        match (self.cell)(tick) {
+/// Appends the fields of `tick` for so many `joints`.
+pub(super) fn write<W: Write>(
+    columns: &[TickColumn],
+    mut tick: Tick,
+    joints: usize,
+    table: &mut Table<W>,
+) -> io::Result<()> {
+    columns.iter().try_for_each(|(_, cell)| {
+        match cell(&mut tick) {
             Number(number) => table.field(number),
             Count(count) => table.field(count),
             Switch(switch) => table.field(u8::from(*switch)),
             Remarks(flags) => table.field(flags.bits()),
             Text(text) => table.field(text),
-            Vector(vector) => return write_vector(vector, joints, table),
+            Positions(vector) | Efforts(vector) => return write_vector(vector, joints, table),
         }
         .map(drop)
+    })
+}
+
+impl Cell<'_> {
+    fn width(&self, joints: usize) -> usize {
+        if matches!(self, Positions(_) | Efforts(_)) { joints } else { 1 }
     }
 }
 
@@ -130,19 +120,20 @@ pub(super) fn write_vector<W: Write>(vector: &JointVector, joints: usize, table:
 }
 
 /// Reads `fields`, a row of `columns` for so many `joints`, into `tick`. `Err` says what is wrong.
-pub(super) fn read(columns: &[Column], mut fields: &[&str], joints: usize, tick: &mut Tick) -> Result<(), String> {
-    for column in columns {
-        let (own, rest) = fields.split_at_checked(column.width(joints)).ok_or("too few fields")?;
-        fields = rest;
+pub(super) fn read(columns: &[TickColumn], mut fields: &[&str], joints: usize, tick: &mut Tick) -> Result<(), String> {
+    for (_, cell) in columns {
+        let cell = cell(tick);
+        let (own, rest) = fields.split_at_checked(cell.width(joints)).ok_or("too few fields")?;
         let field = own.first().copied().unwrap_or_default();
-        match (column.cell)(tick) {
+        match cell {
             Number(value) => *value = number(field)?,
             Count(count) => *count = number(field)?,
             Switch(switch) => *switch = number::<u8>(field)? != 0,
             Remarks(flags) => *flags = Flags::from_bits_truncate(number(field)?),
-            Vector(vector) => *vector = read_vector(own, joints)?,
+            Positions(vector) | Efforts(vector) => *vector = read_vector(own, joints)?,
             Text(_) => {}
         }
+        fields = rest;
     }
     Ok(())
 }

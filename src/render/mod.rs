@@ -2,7 +2,6 @@
 
 pub mod accounts;
 pub mod channels;
-pub(crate) mod clock;
 mod columns;
 mod contact_forces;
 pub mod control;
@@ -26,7 +25,8 @@ pub mod realtime;
 pub mod recording;
 pub mod session;
 pub mod setup;
-pub mod timing;
 mod torque_history;
 pub mod trace;
 pub mod watchdog;
+
+pub use crate::control::timing;

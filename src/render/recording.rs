@@ -11,14 +11,15 @@
 //! reading gives the same bits. A position of a wrong number of joints has empty fields.
 
 use super::{
-    columns::{Column, FELT, RECORDED, number, read, read_vector, width, write_vector},
+    columns::{FELT, RECORDED, head, number, read, read_vector, width, write, write_vector},
     graphics::Graphics,
     haptic::Haptics,
-    session::{Driver, Frames, Plan, SessionError},
+    session::{Driver, Frames, HapticController, Latest, Plan, SessionError, collect},
     trace::{Tick, Trace},
 };
 use crate::{
     JointVector,
+    control::Clock,
     csv::{Lines, Table, TableError},
     dataset::JointLabel,
     device::{Applied, Device, Reading},
@@ -56,11 +57,6 @@ const START: &str = "# start";
 /// Beginning of the comment with the frames' instants.
 const KEPT: &str = "# frames";
 
-/// The columns of which a row consists where contact is `solved_meanwhile`.
-fn columns(solved_meanwhile: bool) -> impl Iterator<Item = &'static Column> {
-    RECORDED.iter().chain(FELT.iter().filter(move |_| solved_meanwhile))
-}
-
 impl Recording {
     /// Writes what is needed to have the session of `trace` again, which must hold every tick of it.
     ///
@@ -73,11 +69,13 @@ impl Recording {
         write_vector(&trace.start, joints, table.field(START)?)?;
         table.end()?;
         table.field(KEPT)?.fields(trace.frames.iter().map(|frame| frame.time))?.end()?;
-        columns(trace.solved_meanwhile).try_for_each(|column| column.head(&trace.joints, &mut table))?;
+        let felt = if trace.solved_meanwhile { FELT } else { &[] };
+        head(RECORDED, &trace.joints, &mut table)?;
+        head(felt, &trace.joints, &mut table)?;
         table.end()?;
         for tick in &trace.ticks {
-            let mut row = *tick;
-            columns(trace.solved_meanwhile).try_for_each(|column| column.write(&mut row, joints, &mut table))?;
+            write(RECORDED, *tick, joints, &mut table)?;
+            write(felt, *tick, joints, &mut table)?;
             table.end()?;
         }
         Ok(())
@@ -140,22 +138,31 @@ impl Recording {
         let mut device = Playback { recording: self, next: None };
         let mut driver = Driver::new(haptics, &mut device, None)?;
         let plan = Plan { joints, ticks: self.ticks.len(), snapshots: self.kept.clone() };
-        let mut frames = graphics.map(|graphics| Frames::new(graphics, &plan));
-        let mut ticks = plan.new_ticks()?;
-        for recorded in &self.ticks {
-            if recorded.restart {
-                driver.clear_fault();
+        let mut times = self.ticks.iter().map(|tick| (tick.inputs.elapsed, tick.inputs.interval));
+        // What befell the loop beside the device's readings befalls it again.
+        let befall = |controller: &mut HapticController<'_>, tick: &Tick| {
+            if tick.restart {
+                controller.clear().ask();
             }
             if self.solved_meanwhile {
-                driver.feel(recorded.sample);
+                controller.feel(tick.sample);
             }
-            let (tick, latest) = driver.tick(recorded.inputs.elapsed, recorded.inputs.interval);
-            ticks.push(Tick { frames: recorded.frames, ..tick });
+        };
+        let mut recorded = self.ticks.iter();
+        let mut next = recorded.next();
+        next.into_iter().for_each(|first| befall(&mut driver.controller, first));
+        let each = |controller: &mut HapticController<'_>,
+                    tick: &mut Tick,
+                    mut frames: Option<&mut Frames<'_, '_>>,
+                    latest: &Latest| {
+            tick.frames = next.map_or(0, |recorded| recorded.frames);
             if let Some(frames) = &mut frames {
-                (0..recorded.frames).for_each(|_| frames.draw(&latest));
+                (0..tick.frames).for_each(|_| frames.draw(latest));
             }
-        }
-        let frames = frames.map(Frames::kept).unwrap_or_default();
+            next = recorded.next();
+            next.into_iter().for_each(|next| befall(controller, next));
+        };
+        let (ticks, frames) = collect(driver, Clock::Recorded(&mut times), graphics, &plan, each)?;
         let (joints, solved_meanwhile) = (plan.joints, self.solved_meanwhile);
         Ok(Trace { joints, start: self.start, ticks, frames, solved_meanwhile })
     }
@@ -183,11 +190,11 @@ impl Device for Playback<'_> {
     fn read(&mut self, _: f64) -> Reading {
         let Some(next) = self.next.replace(self.next.map_or(0, |next| next + 1)) else {
             let start = self.recording.start;
-            return Reading { position: start, age: 0.0, hand: start };
+            return Reading::at(start);
         };
         // No more readings than ticks are asked for.
         let tick = &self.recording.ticks[next.min(self.recording.ticks.len() - 1)];
-        Reading { position: tick.inputs.position, age: tick.inputs.age, hand: tick.hand }
+        Reading { age: tick.inputs.age, hand: tick.hand, ..Reading::at(tick.inputs.position) }
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {

@@ -1,5 +1,6 @@
-//! A rendering session: device, haptic loop and graphics loop, recorded. Offline, as fast as it goes and deterministic;
-//! `realtime.rs` runs the same ticks and frames against the clock.
+//! A rendering session: device, haptic loop and graphics loop, recorded. The haptic loop is a [`Controller`], so that any
+//! clock ticks it: here as fast as it goes and deterministic; in `realtime.rs` against time, in `recording.rs` as it
+//! was.
 //!
 //! Two loops at two rates (section 3.2): a tick every T, and a frame of the object every T_g. Frame j is drawn at the
 //! first tick at or after `j T_g`, from the proxy's configuration then.
@@ -12,7 +13,18 @@ use super::{
     live::Live,
     trace::{Frame, Tick, Trace},
 };
-use crate::{JointVector, dataset::JointLabel, device::Device, field::Sample, memory};
+use crate::{
+    JointVector,
+    control::{Clock, ClockError, ControlLoop, Controller},
+    dataset::JointLabel,
+    device::{Applied, Device, Reading},
+    field::Sample,
+    memory,
+};
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering},
+};
 
 /// How long, and what to keep of the object's shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,17 +47,9 @@ pub enum SessionError {
     /// An effect needs contact forces that are solved meanwhile, and nobody solves them.
     #[error("the session cannot start: friction and contact damping need contact forces, and nobody solves them")]
     NoForces,
-    /// The device's own thread calls at another rate than the scene's.
-    #[error(
-        "the session cannot start: the device's own thread calls {device} times a second, and the scene's loop runs at \
-         {scene} Hz: set rate = {device} in [haptics] of the scene, and bake it again"
-    )]
-    Rate {
-        /// The device's (Hz).
-        device: f64,
-        /// The scene's (Hz).
-        scene: f64,
-    },
+    /// There is no clock.
+    #[error("the session cannot start: {0}")]
+    Clock(#[from] ClockError),
     /// The object cannot be drawn.
     #[error(transparent)]
     Graphics(#[from] GraphicsError),
@@ -58,7 +62,7 @@ pub enum SessionError {
 }
 
 /// The part of a tick that graphics needs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Latest {
     /// Time of the tick (s); negative before the first.
     pub time: f64,
@@ -70,16 +74,30 @@ pub struct Latest {
     pub share: f64,
 }
 
-/// The haptic loop with its device: one call a tick. However it ends, it leaves the device without torque.
-pub struct Driver<'session> {
+/// The haptic loop as what answers a device. A tick gives its record and what graphics needs of it.
+pub struct HapticController<'session> {
     haptics: &'session Haptics,
-    device: &'session mut dyn Device,
     state: State,
-    time: f64,
-    ticks: usize,
-    restart: bool,
-    start: JointVector,
     source: ContactSource,
+    start: JointVector,
+    /// The tick that is under way, or was the last; none before the first.
+    tick: Option<(Tick, Latest)>,
+    clear: ClearFault,
+}
+
+/// The haptic loop with its device.
+pub type Driver<'session> = ControlLoop<'session, HapticController<'session>>;
+
+/// A way to clear the haptic loop's fault from any thread: its next tick starts again where the device is, unless the
+/// device still fails.
+#[derive(Clone, Debug, Default)]
+pub struct ClearFault(Arc<AtomicBool>);
+
+impl ClearFault {
+    /// Asks for it. Nothing happens where there is no fault. Never waits.
+    pub fn ask(&self) {
+        self.0.store(true, Ordering::Release);
+    }
 }
 
 impl Plan {
@@ -117,54 +135,56 @@ impl<'session> Driver<'session> {
         if haptics.effects().is_some_and(ContactEffects::need_solved_forces) && !are_solved {
             return Err(SessionError::NoForces);
         }
-        let position = device.read(0.0).position;
-        let state = haptics.start(&position)?;
+        let start = device.read(0.0).position;
+        let state = haptics.start(&start)?;
         let source = live.map_or(ContactSource::Dataset, |live| ContactSource::Live(Box::new(live)));
-        Ok(Self { haptics, device, state, time: 0.0, ticks: 0, restart: false, start: position, source })
+        let clear = ClearFault::default();
+        Ok(Self::of(HapticController { haptics, state, source, start, tick: None, clear }, device))
     }
 
     /// Asks for a fault to be cleared at the next tick: the loop then starts again where the device is. Nothing happens
     /// where there is no fault, or the device still reports no position.
-    pub fn clear_fault(&mut self) {
-        self.restart = true;
-    }
-
-    /// Has the next ticks feel the contact of `sample`.
-    pub(super) fn feel(&mut self, sample: Sample) {
-        self.source = ContactSource::Recorded(sample);
+    pub fn clear_fault(&self) {
+        self.controller.clear.ask();
     }
 
     /// Returns where the device was when the session began (rad or m).
     #[must_use]
     pub fn start(&self) -> &JointVector {
-        &self.start
+        &self.controller.start
+    }
+}
+
+impl HapticController<'_> {
+    /// Has the next tick feel the contact of `sample`.
+    pub(super) fn feel(&mut self, sample: Sample) {
+        self.source = ContactSource::Recorded(sample);
     }
 
-    /// Commands zero torque: the last that a device hears of a session.
-    pub fn let_go(&mut self) {
-        self.device.apply(&JointVector::zeros(self.haptics.joints()));
+    /// What clears its fault.
+    #[must_use]
+    pub fn clear(&self) -> ClearFault {
+        self.clear.clone()
+    }
+}
+
+impl Controller for HapticController<'_> {
+    type Record = (Tick, Latest);
+
+    fn joints(&self) -> usize {
+        self.haptics.joints()
     }
 
-    /// One tick, `elapsed` after the one before and `interval` before the next (s): read, compute, apply. Answers with
-    /// the record and what graphics needs of it. Never allocates.
-    pub fn tick(&mut self, elapsed: f64, interval: f64) -> (Tick, Latest) {
-        // The first tick follows the reading in `new` at once.
-        let since = if self.ticks == 0 { 0.0 } else { elapsed };
-        self.ticks += 1;
-        self.time += since;
-        let reading = self.device.read(since);
+    fn answer(&mut self, reading: &Reading, elapsed: f64, interval: f64) -> JointVector {
+        let time = self.tick.map_or(0.0, |(last, _)| last.time + elapsed);
         // A device that still fails keeps its fault.
-        let restart = std::mem::take(&mut self.restart)
+        let restart = self.clear.0.swap(false, Ordering::Acquire)
             && self.state.fault().is_some()
             && self.haptics.restart(&mut self.state, &reading.position).is_ok();
         let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
         let output = self.haptics.tick_with(&mut self.state, &inputs, &mut self.source);
-        let applied = self.device.apply(&output.torque);
-        self.state.hold(&applied.torque);
-        let share = if output.sample.contact { output.sample.share } else { 0.0 };
-        let latest = Latest { time: self.time, proxy: output.proxy, device: output.device, share };
         let tick = Tick {
-            time: self.time,
+            time,
             inputs,
             in_arrears: false,
             restart,
@@ -172,20 +192,22 @@ impl<'session> Driver<'session> {
             device: output.device,
             proxy: output.proxy,
             device_torque: output.torque,
-            applied,
+            applied: Applied::default(),
             sample: output.sample,
             flags: output.flags,
             fault: output.fault,
             accounts: output.accounts,
             frames: 0,
         };
-        (tick, latest)
+        let share = if output.sample.contact { output.sample.share } else { 0.0 };
+        self.tick = Some((tick, Latest { time, proxy: output.proxy, device: output.device, share }));
+        output.torque
     }
-}
 
-impl Drop for Driver<'_> {
-    fn drop(&mut self) {
-        self.device.apply(&JointVector::zeros(self.haptics.joints()));
+    fn held(&mut self, applied: &Applied) -> Self::Record {
+        self.state.hold(&applied.torque);
+        let (tick, latest) = self.tick.unwrap_or_default();
+        (Tick { applied: *applied, ..tick }, latest)
     }
 }
 
@@ -250,21 +272,38 @@ pub fn run(
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
 ) -> Result<Trace, SessionError> {
-    let mut driver = Driver::new(haptics, device, None)?;
+    let (driver, period) = (Driver::new(haptics, device, None)?, haptics.period());
+    let start = *driver.start();
+    let as_due =
+        |_: &mut HapticController<'_>, tick: &mut Tick, frames: Option<&mut Frames<'_, '_>>, latest: &Latest| {
+            if let Some(frames) = frames {
+                while frames.due() <= tick.time {
+                    frames.draw(latest);
+                    tick.frames += 1;
+                }
+            }
+        };
+    let (ticks, frames) = collect(driver, Clock::Steps(period), graphics, plan, as_due)?;
+    Ok(Trace { joints: plan.joints.clone(), start, ticks, frames, solved_meanwhile: false })
+}
+
+/// Runs `driver` by `clock` for the ticks of `plan`, and calls `each` after each of them. Returns all ticks, and the
+/// frames that are kept.
+pub(super) fn collect<'session>(
+    mut driver: Driver<'session>,
+    clock: Clock<'_>,
+    graphics: Option<&mut Graphics<'_>>,
+    plan: &Plan,
+    mut each: impl FnMut(&mut HapticController<'session>, &mut Tick, Option<&mut Frames<'_, '_>>, &Latest) + Send,
+) -> Result<(Vec<Tick>, Vec<Frame>), SessionError> {
     let mut frames = graphics.map(|graphics| Frames::new(graphics, plan));
     let mut ticks = plan.new_ticks()?;
-    for _ in 0..plan.ticks {
-        let (tick, latest) = driver.tick(haptics.period(), haptics.period());
-        if let Some(frames) = &mut frames {
-            while frames.due() <= tick.time {
-                frames.draw(&latest);
-            }
-        }
-        ticks.push(tick);
+    if plan.ticks > 0 {
+        driver.run(clock, |controller, (mut tick, latest), _| {
+            each(controller, &mut tick, frames.as_mut(), &latest);
+            ticks.push(tick);
+            ticks.len() < plan.ticks
+        });
     }
-    if let Some(frames) = &frames {
-        frames.count(&mut ticks);
-    }
-    let frames = frames.map(Frames::kept).unwrap_or_default();
-    Ok(Trace { joints: plan.joints.clone(), start: *driver.start(), ticks, frames, solved_meanwhile: false })
+    Ok((ticks, frames.map(Frames::kept).unwrap_or_default()))
 }

@@ -6,7 +6,7 @@
 
 use super::{
     accounts::Accounts,
-    columns::TRACED,
+    columns::{self, TRACED},
     flags::{Fault, Flags},
     haptic::Inputs,
 };
@@ -232,15 +232,15 @@ impl<W: Write> TickTable<W> {
     /// Those of `out`, here and below.
     pub fn new(joints: &[JointLabel], out: W) -> io::Result<Self> {
         let mut table = Table::new(out);
-        TRACED.iter().try_for_each(|column| column.head(joints, &mut table))?;
+        columns::head(TRACED, joints, &mut table)?;
         table.fields(Accounts::default().named().map(|(name, _)| format!("{name} [J]")))?.end()?;
         Ok(Self { table, joints: joints.len() })
     }
 
     /// Writes a row.
     pub fn add(&mut self, tick: &Tick) -> io::Result<()> {
-        let (Self { table, joints }, mut row) = (self, *tick);
-        TRACED.iter().try_for_each(|column| column.write(&mut row, *joints, table))?;
+        let Self { table, joints } = self;
+        columns::write(TRACED, *tick, *joints, table)?;
         for (_, account) in tick.accounts.named() {
             table.optional(account)?;
         }

@@ -3,41 +3,37 @@
 //! device gives way while it is held, holds on where it is let go, and is measured there, so that no row contains the
 //! hand's own torque.
 //!
-//! Everything here drives a [`Rig`]: the [`simulated`] one, which touches no real object, and every log and dataset
-//! made with it says so; or a device's (`device/rig.rs`).
+//! What answers the device is a state machine (`controller.rs`), ticked like any other (`control/`). The device is the
+//! [`simulated`] one, which touches no real object, and every log and dataset made with it says so; or a real one.
 
-mod control;
+mod controller;
 mod log;
+mod pd_control;
 mod plan;
-mod rig;
 pub mod simulated;
 mod steady;
 mod trajectory;
 
-pub use control::{PdControl, PdOutput};
+pub use controller::GRAVITY;
 pub use log::{LogError, LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
+pub use pd_control::{PdControl, PdOutput};
 pub use plan::{Plan, Stop};
-pub use rig::{Rig, RigError, RigReading};
 pub use steady::Steadiness;
 pub use trajectory::Trajectory;
 
 use crate::{
-    JointVector,
+    control::{Clock, ClockError, ControlLoop, Patience, beside},
     dataset::JointLabel,
-    proxy::{Chain, Pose},
-    scene::{JointKind, JointSpec, ScanSpec},
+    device::{Clamps, Device},
+    proxy::Chain,
+    scene::{JointSpec, ScanSpec},
 };
-use glam::DVec3;
+use controller::{End, Route, ScanController};
 use std::{
     collections::HashSet,
+    io,
     sync::atomic::{AtomicBool, Ordering},
 };
-
-/// Acceleration of gravity (m/s^2), standard value.
-pub const GRAVITY: f64 = 9.806_65;
-
-/// Time for which a device is braked after a limit (s): several time constants of damping against inertia.
-const BRAKE_TIME: f64 = 0.3;
 
 /// A scan failed or was stopped.
 #[derive(Debug, thiserror::Error)]
@@ -53,8 +49,14 @@ pub enum ScanError {
     #[error("the joints reach no point of the plan: check its start, directions and the joints' limits")]
     NothingReachable,
     /// The device failed.
+    #[error("the rig failed: {0}")]
+    Rig(String),
+    /// The device has no clock for the scan.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Clock(#[from] ClockError),
+    /// The system gives no thread.
+    #[error("a scan needs a thread for its device: {0}; close other programs")]
+    Thread(#[from] io::Error),
     /// The log failed.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -67,6 +69,12 @@ pub enum ScanError {
         what: String,
     },
 }
+
+/// Where the rate of a scan is set.
+pub const RATE: &str = "[scan.control] of the scene";
+
+/// Measured rows that wait for the disk.
+const ROWS: usize = 256;
 
 /// How far a scan has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,20 +110,6 @@ pub struct ScanReport {
     pub simulated: bool,
 }
 
-/// A rig under control, tick by tick.
-struct Driver<'a> {
-    spec: &'a ScanSpec,
-    chain: &'a Chain,
-    rig: &'a mut dyn Rig,
-    control: PdControl,
-    steady: Steadiness,
-    pose: Pose,
-    /// The node whose position is kept within the workspace.
-    node: usize,
-    reading: RigReading,
-    period: f64,
-}
-
 /// Names and units of a chain's joints.
 #[must_use]
 pub fn labels(chain: &Chain) -> Vec<JointLabel> {
@@ -123,113 +117,125 @@ pub fn labels(chain: &Chain) -> Vec<JointLabel> {
     chain.joints.iter().map(label).collect()
 }
 
-/// A rig and a log, ready to scan.
+/// A device and a log, ready to scan.
 pub struct Session<'a> {
     /// How to scan.
     pub spec: &'a ScanSpec,
     /// The device's chain.
     pub chain: &'a Chain,
-    /// The device.
-    pub rig: &'a mut dyn Rig,
+    /// The device, joint-true.
+    pub device: &'a mut dyn Device,
+    /// Whether it has a time of its own, so that it is ticked against that and `stop` ends the scan at once: motors are
+    /// on. Else it is ticked as fast as it goes.
+    pub against_time: bool,
+    /// What the log says of device and scan.
+    pub header: &'a LogHeader,
     /// Where rows go.
     pub log: &'a mut LogWriter,
     /// Ends the scan after the current point.
     pub stop: &'a AtomicBool,
     /// Called after every point.
-    pub progress: &'a mut dyn FnMut(ScanProgress),
+    pub progress: &'a mut (dyn FnMut(ScanProgress) + Send),
 }
 
 impl Session<'_> {
-    /// Leads the rig through `plan` and logs every point that is not among `logged`.
+    /// Leads the device through `plan` and logs every point that is not among `logged`.
     ///
     /// # Errors
-    /// When the rig or the log fails, or a limit is exceeded; the log then holds all that was measured.
+    /// When the device or the log fails, or a limit is exceeded; the log then holds all that was measured.
     pub fn scan(&mut self, plan: &Plan, logged: &[ScanRow]) -> Result<ScanReport, ScanError> {
-        let mut report = self.report(plan.points);
-        report.unreachable = plan.unreachable.len();
-        logged.iter().for_each(|row| report.count(row.status));
-        let reachable = plan.points - plan.unreachable.len();
         let done: HashSet<usize> = logged.iter().map(|row| row.point).collect();
-        let mut driver = Driver::start(self.spec, self.chain, &mut *self.rig)?;
-        let begun = driver.reading.time;
-        for next in pending(plan, &done) {
-            if self.stop.load(Ordering::Relaxed) {
-                break;
-            }
-            let row = match driver.visit(&next) {
-                Ok(row) => row,
-                Err(Interruption::Rig(error)) => return Err(error.into()),
-                Err(Interruption::Limit(what)) => {
-                    let row = driver.stopped(next.point.unwrap_or(plan.points))?;
-                    self.log.append(&row)?;
-                    return Err(ScanError::Limit { point: row.point, what });
-                }
-            };
-            if let Some(row) = row {
-                self.log.append(&row)?;
-                report.count(row.status);
-                (self.progress)(ScanProgress { done: report.logged(), points: reachable, time: row.time });
-            }
-        }
-        report.seconds = driver.reading.time - begun;
-        report.whole = report.logged() >= reachable;
+        let stops = pending(plan, &done).into_iter().rev().collect();
+        let unreachable = plan.unreachable.len();
+        let report = ScanReport { points: plan.points, unreachable, ..ScanReport::default() };
+        let mut report = self.run((Route::Planned(stops, plan.points), 0), report, logged)?;
+        report.whole = report.logged() >= plan.points - unreachable;
         Ok(report)
     }
 
     /// Logs wherever a hand leads the device to and lets go of it, for `seconds`; rows are numbered on from those
     /// `logged`.
     ///
-    /// While the hand holds the device ([`RigReading::held`]), damping alone resists it, and no limit applies: nothing
-    /// drives it. Once it is let go, PD control holds it where it is, under all limits; when it is steady, it is
-    /// measured. A hand that takes hold meanwhile ends the measurement without a row.
+    /// While the hand holds the device ([`Reading::held`](crate::device::Reading::held)), damping alone resists it, and
+    /// no limit applies: nothing drives it. Once it is let go, PD control holds it where it is, under all limits; when
+    /// it is steady, it is measured. A hand that takes hold meanwhile ends the measurement without a row.
     ///
     /// # Errors
-    /// When the rig or the log fails, or a limit is exceeded; the log then holds all that was measured.
+    /// When the device or the log fails, or a limit is exceeded; the log then holds all that was measured.
     pub fn guided(&mut self, seconds: f64, logged: &[ScanRow]) -> Result<ScanReport, ScanError> {
-        let mut report = self.report(0);
-        logged.iter().for_each(|row| report.count(row.status));
-        let mut next = logged.iter().map(|row| row.point + 1).max().unwrap_or(0);
-        let mut driver = Driver::start(self.spec, self.chain, &mut *self.rig)?;
-        let begun = driver.reading.time;
-        let goes_on = |time: f64| time - begun < seconds && !self.stop.load(Ordering::Relaxed);
-        while goes_on(driver.reading.time) {
-            let row = match driver.be_led(next, &goes_on) {
-                Ok(row) => row,
-                Err(Interruption::Rig(error)) => return Err(error.into()),
-                Err(Interruption::Limit(what)) => {
-                    self.log.append(&driver.stopped(next)?)?;
-                    return Err(ScanError::Limit { point: next, what });
-                }
-            };
-            if let Some(row) = row {
-                self.log.append(&row)?;
-                next += 1;
-                report.count(row.status);
-                let done = report.logged();
-                (self.progress)(ScanProgress { done, points: done, time: row.time });
-            }
-        }
-        report.points = report.logged();
-        report.seconds = driver.reading.time - begun;
-        report.whole = true;
+        let next = logged.iter().map(|row| row.point + 1).max().unwrap_or(0);
+        let mut report = self.run((Route::Guided(seconds), next), ScanReport::default(), logged)?;
+        (report.points, report.whole) = (report.logged(), true);
         Ok(report)
     }
 
-    fn report(&self, points: usize) -> ScanReport {
-        let (rig, simulated) = (self.rig.description(), self.rig.is_simulated());
-        ScanReport { points, rig, simulated, ..ScanReport::default() }
-    }
-}
-
-/// Why a visit ended early.
-enum Interruption {
-    Rig(RigError),
-    Limit(String),
-}
-
-impl From<RigError> for Interruption {
-    fn from(error: RigError) -> Self {
-        Self::Rig(error)
+    /// Runs the scan and counts its rows in `report`.
+    fn run(
+        &mut self,
+        route: (Route, usize),
+        mut report: ScanReport,
+        logged: &[ScanRow],
+    ) -> Result<ScanReport, ScanError> {
+        (report.rig, report.simulated) = (self.header.rig.clone(), self.header.simulated);
+        logged.iter().for_each(|row| report.count(row.status));
+        let (spec, chain, against_time) = (self.spec, self.chain, self.against_time);
+        let controller = ScanController::new(spec, chain, route, self.stop);
+        let (log, progress) = (&mut *self.log, &mut *self.progress);
+        let reachable = report.points - report.unreachable;
+        let mut keep = |row: ScanRow| -> Result<(), LogError> {
+            log.append(&row)?;
+            report.count(row.status);
+            let done = report.logged();
+            progress(ScanProgress { done, points: reachable.max(done), time: row.time });
+            Ok(())
+        };
+        let (failed, period) = (AtomicBool::new(false), 1.0 / spec.control.rate);
+        let stop = self.stop;
+        let patience = || (!failed.load(Ordering::Relaxed) && !stop.load(Ordering::Relaxed)).then_some(Patience::Spins);
+        let mut kept = Ok(());
+        let mut take = |row: ScanRow| {
+            if kept.is_ok() {
+                kept = keep(row);
+                failed.store(kept.is_err(), Ordering::Relaxed);
+            }
+        };
+        let mut stopped = Vec::new();
+        let clock = if against_time { Clock::of(self.device, period, RATE, &patience)? } else { Clock::Steps(period) };
+        let mut driver = ControlLoop::of(controller, self.device);
+        if against_time {
+            let (mut rows, measured) = rtrb::RingBuffer::new(ROWS);
+            // A disk that keeps so many rows waiting is as good as one that fails.
+            let send = |scan: &mut ScanController<'_>, row: Option<ScanRow>, _| {
+                row.is_none_or(|row| rows.push(row).is_ok()) && !scan.is_over()
+            };
+            stopped = beside("device", measured, || driver.run(clock, send).refused, &mut take)?
+                .map_err(|_| ScanError::Rig("the thread that drives the device ended unexpectedly".into()))?;
+        } else {
+            driver.run(clock, |scan, row, _| {
+                row.into_iter().for_each(&mut take);
+                !scan.is_over() && !failed.load(Ordering::Relaxed)
+            });
+        }
+        let controller = &driver.controller;
+        kept?;
+        report.seconds = controller.seconds();
+        match controller.end() {
+            None if controller.is_over() => Ok(report),
+            None if stop.load(Ordering::Relaxed) => {
+                Err(ScanError::Rig("interrupted; --resume goes on after the last point in the log".into()))
+            }
+            None => Err(ScanError::Rig(stopped.pop().unwrap_or_else(|| "the log takes too long to write".into()))),
+            Some(End::Limit(point, limit)) => Err(ScanError::Limit { point, what: limit.text(spec, chain) }),
+            Some(End::Halt(halt)) => Err(ScanError::Rig(halt.to_string())),
+            Some(End::Reduced(torque, clamps)) => {
+                let is_warm = clamps.contains(Clamps::WARM);
+                let why = if is_warm { "its motors are warm" } else { "it is beyond the device's limit" };
+                Err(ScanError::Rig(format!(
+                    "the device cannot hold {torque:.3?} (N m or N, joint by joint), {why}: what it would measure is \
+                     not the contact's torque; press less deep or lower the gains of [scan.control]"
+                )))
+            }
+        }
     }
 }
 
@@ -262,154 +268,6 @@ impl ScanReport {
 
     fn logged(&self) -> usize {
         self.steady + self.unsteady + self.limited
-    }
-}
-
-impl<'a> Driver<'a> {
-    /// Reads the device and holds it where it is.
-    fn start(spec: &'a ScanSpec, chain: &'a Chain, rig: &'a mut dyn Rig) -> Result<Self, ScanError> {
-        let control = &spec.control;
-        let period = 1.0 / control.rate;
-        let reading = rig.hold(&JointVector::zeros(chain.degrees_of_freedom()), period)?;
-        let ticks = (control.window * control.rate).round() as usize;
-        let node = spec.plan.node(chain.nodes.len());
-        let pd = PdControl::new(control.stiffness, control.damping, control.speed, reading.position);
-        let steady = Steadiness::new(ticks, control.still, control.drift);
-        Ok(Self { spec, chain, rig, control: pd, steady, pose: chain.new_pose(), node, reading, period })
-    }
-
-    /// One tick of control; true when the device is steady.
-    fn tick(&mut self) -> Result<bool, Interruption> {
-        let output = self.control.torque(&self.reading.position, self.period);
-        self.check(&output).map_err(Interruption::Limit)?;
-        let steady = self.steady.observe(&self.reading.position, &output.torque);
-        self.hold(&output.torque)?;
-        Ok(steady)
-    }
-
-    /// Holds `torque` and the weight of the links for a tick.
-    fn hold(&mut self, torque: &JointVector) -> Result<(), RigError> {
-        self.chain.pose(&self.reading.position, &mut self.pose);
-        let weight = self.chain.gravity_torque(&self.pose, DVec3::new(0.0, 0.0, -GRAVITY));
-        let mut total = *torque;
-        total.iter_mut().zip(weight.iter()).for_each(|(total, weight)| *total -= weight);
-        self.reading = self.rig.hold(&total, self.period)?;
-        Ok(())
-    }
-
-    /// Returns a message if a quantity exceeds its limit.
-    fn check(&mut self, output: &PdOutput) -> Result<(), String> {
-        let limits = &self.spec.limits;
-        let joints = &self.chain.joints;
-        for (joint, (name, kind)) in joints.iter().map(|joint| (&joint.name, joint.kind)).enumerate() {
-            let (unit, effort) = (kind.unit(), kind.effort_unit());
-            let (torque, most) = (output.torque[joint].abs(), limits.torque[joint]);
-            if torque > most {
-                let what = if kind == JointKind::Revolute { "torque" } else { "force" };
-                return Err(format!("the {what} of joint `{name}` is {torque:.3}, its limit is {most} {effort}"));
-            }
-            let (speed, most) = (output.speed[joint].abs(), limits.speed);
-            if speed > most {
-                return Err(format!("the speed of joint `{name}` is {speed:.3}, the limit is {most} {unit}/s"));
-            }
-        }
-        self.chain.pose(&self.reading.position, &mut self.pose);
-        let place = self.pose.nodes[self.node];
-        let [least, greatest] = limits.workspace;
-        if place.cmplt(least).any() || place.cmpgt(greatest).any() {
-            return Err(format!("the proxy is at {place:.4} m, outside the workspace {least} to {greatest}"));
-        }
-        Ok(())
-    }
-
-    /// Goes to a stop; measures there if it is a point.
-    fn visit(&mut self, stop: &Stop) -> Result<Option<ScanRow>, Interruption> {
-        while !self.control.advance(&stop.q, self.period) {
-            self.tick()?;
-        }
-        stop.point.map_or(Ok(None), |point| self.measure(point))
-    }
-
-    /// Waits for a hand, gives way to it, and measures where it lets go; `None` where it takes hold again before that,
-    /// or the time is over.
-    fn be_led(&mut self, point: usize, goes_on: &impl Fn(f64) -> bool) -> Result<Option<ScanRow>, Interruption> {
-        while !self.reading.held {
-            if !goes_on(self.reading.time) {
-                return Ok(None);
-            }
-            self.tick()?;
-        }
-        while self.reading.held {
-            if !goes_on(self.reading.time) {
-                return Ok(None);
-            }
-            self.control.follow(&self.reading.position);
-            let torque = self.control.torque(&self.reading.position, self.period).torque;
-            self.hold(&torque)?;
-        }
-        self.control.follow(&self.reading.position);
-        self.measure(point)
-    }
-
-    /// Waits where it is until the device is steady, and averages; `None` where a hand takes hold of it.
-    fn measure(&mut self, point: usize) -> Result<Option<ScanRow>, Interruption> {
-        self.control.rest();
-        self.steady.restart();
-        let arrived = self.reading.time;
-        let status = loop {
-            let steady = self.tick()?;
-            if self.reading.held {
-                return Ok(None);
-            }
-            if steady {
-                break RowStatus::Steady;
-            }
-            if self.reading.time - arrived > self.spec.control.timeout {
-                break RowStatus::Unsteady;
-            }
-        };
-        self.average(point, status)
-    }
-
-    /// Averages position and contact torque; `None` where a hand takes hold of the device.
-    fn average(&mut self, point: usize, status: RowStatus) -> Result<Option<ScanRow>, Interruption> {
-        let joints = self.chain.degrees_of_freedom();
-        let zero = JointVector::zeros(joints);
-        let (mut q, mut torque, mut squares) = (zero, zero, zero);
-        let ticks = (self.spec.control.average * self.spec.control.rate).round().max(1.0) as u32;
-        for tick in 1..=ticks {
-            let output = self.control.torque(&self.reading.position, self.period);
-            self.check(&output).map_err(Interruption::Limit)?;
-            for joint in 0..joints {
-                q[joint] += (self.reading.position[joint] - q[joint]) / f64::from(tick);
-                let before = -output.torque[joint] - torque[joint];
-                torque[joint] += before / f64::from(tick);
-                squares[joint] += before * (-output.torque[joint] - torque[joint]);
-            }
-            self.hold(&output.torque)?;
-            if self.reading.held {
-                return Ok(None);
-            }
-        }
-        let mut deviation = zero;
-        for (deviation, sum) in deviation.iter_mut().zip(squares.iter()) {
-            *deviation = (sum / f64::from((ticks - 1).max(1))).sqrt();
-        }
-        Ok(Some(ScanRow { point, time: self.reading.time, q, torque, deviation, ticks, status }))
-    }
-
-    /// After a limit: damping alone, until the device has come to rest; then the row that says where.
-    fn stopped(&mut self, point: usize) -> Result<ScanRow, ScanError> {
-        let joints = self.chain.degrees_of_freedom();
-        let mut brake =
-            PdControl::new(JointVector::zeros(joints), self.spec.control.damping, 0.0, self.reading.position);
-        for _ in 0..(BRAKE_TIME * self.spec.control.rate) as usize {
-            let torque = brake.torque(&self.reading.position, self.period).torque;
-            self.hold(&torque)?;
-        }
-        let RigReading { time, position, .. } = self.reading;
-        let zero = JointVector::zeros(joints);
-        Ok(ScanRow { point, time, q: position, torque: zero, deviation: zero, ticks: 1, status: RowStatus::Limit })
     }
 }
 

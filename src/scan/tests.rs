@@ -2,8 +2,11 @@
 
 use super::simulated::{Hand, NodeContact, SimulatedRig, Sponge};
 use super::*;
+use crate::JointVector;
+use crate::device::{Applied, Halt, Reading};
 use crate::proxy::inverse_kinematics::reach;
 use crate::scene::{PlanAxis, PlanSpec, ScanScene, WorkspacePlan};
+use glam::DVec3;
 use std::path::PathBuf;
 
 fn scene() -> ScanScene {
@@ -48,7 +51,7 @@ impl Bench {
         let rig = self.rig();
         LogHeader {
             rig: rig.description(),
-            simulated: rig.is_simulated(),
+            simulated: true,
             guided: false,
             joints: labels(&self.chain),
             scene: self.scene.text.clone(),
@@ -59,19 +62,19 @@ impl Bench {
         self.folder.path().join("log.csv")
     }
 
-    fn session<T>(&self, rig: &mut dyn Rig, log: &mut LogWriter, run: impl FnOnce(&mut Session<'_>) -> T) -> T {
-        self.session_with(rig, log, &mut |_| {}, run)
+    fn session<T>(&self, device: &mut dyn Device, log: &mut LogWriter, run: impl FnOnce(&mut Session<'_>) -> T) -> T {
+        self.session_with(device, log, &mut |_| {}, run)
     }
 
     fn session_with<T>(
         &self,
-        rig: &mut dyn Rig,
+        device: &mut dyn Device,
         log: &mut LogWriter,
-        progress: &mut dyn FnMut(ScanProgress),
+        progress: &mut (dyn FnMut(ScanProgress) + Send),
         run: impl FnOnce(&mut Session<'_>) -> T,
     ) -> T {
-        let (spec, chain, stop) = (&self.scene.scan, &self.chain, &self.stop);
-        run(&mut Session { spec, chain, rig, log, stop, progress })
+        let (spec, chain, stop, header) = (&self.scene.scan, &self.chain, &self.stop, &self.header());
+        run(&mut Session { spec, chain, device, against_time: false, header, log, stop, progress })
     }
 
     fn scan(&self) -> (Result<ScanReport, ScanError>, Vec<ScanRow>) {
@@ -183,19 +186,20 @@ fn limits_stop_the_scan_log_the_point_and_let_it_go_on_after_it() {
     limited(&|scene| scene.scan.limits.workspace[0].z = -0.008, "outside the workspace");
 }
 
-/// A simulated rig whose readings pass through a function.
-struct Altered<F>(SimulatedRig, F);
+/// A simulated rig whose readings pass through a function of time, which may have it fail.
+struct Altered<F>(SimulatedRig, f64, F, Option<Halt>);
 
-impl<F: FnMut(RigReading) -> Result<RigReading, RigError>> Rig for Altered<F> {
-    fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError> {
-        let reading = self.0.hold(torque, period)?;
-        (self.1)(reading)
+impl<F: FnMut(f64, &mut Reading) -> Option<Halt> + Send> Device for Altered<F> {
+    fn read(&mut self, elapsed: f64) -> Reading {
+        let mut reading = self.0.read(elapsed);
+        self.1 += elapsed;
+        self.3 = (self.2)(self.1, &mut reading);
+        reading
     }
-    fn description(&self) -> String {
-        self.0.description()
-    }
-    fn is_simulated(&self) -> bool {
-        true
+
+    fn apply(&mut self, torque: &JointVector) -> Applied {
+        let applied = self.0.apply(torque);
+        Applied { halt: self.3.or(applied.halt), ..applied }
     }
 }
 
@@ -204,12 +208,13 @@ fn a_rig_that_fails_ends_the_scan_and_keeps_the_log() {
     let bench = Bench::new(scene());
     let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
     let mut readings = 0;
-    let mut rig = Altered(bench.rig(), |reading| {
+    let fails = |_: f64, _: &mut Reading| {
         readings += 1;
-        if readings > 3000 { Err(RigError("no answer".to_owned())) } else { Ok(reading) }
-    });
+        (readings > 3000).then_some(Halt::Unplugged)
+    };
+    let mut rig = Altered(bench.rig(), 0.0, fails, None);
     let result = bench.session(&mut rig, &mut log, |session| session.scan(&bench.plan, &[]));
-    assert!(result.err().unwrap().to_string().contains("no answer"));
+    assert!(result.err().unwrap().to_string().contains("unplugged"));
     assert!(!ScanLog::read(&bench.path()).unwrap().rows.is_empty());
 }
 
@@ -249,8 +254,11 @@ fn a_guided_scan_logs_the_object_alone_and_never_the_hand() {
 fn a_hand_on_the_device_in_a_planned_scan_leaves_the_point_open() {
     let bench = Bench::new(scene());
     let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
-    let held = |reading: RigReading| Ok(RigReading { held: (2.0..3.5).contains(&reading.time), ..reading });
-    let mut rig = Altered(bench.rig(), held);
+    let held = |time: f64, reading: &mut Reading| {
+        reading.held = (2.0..3.5).contains(&time);
+        None
+    };
+    let mut rig = Altered(bench.rig(), 0.0, held, None);
     let report = bench.session(&mut rig, &mut log, |session| session.scan(&bench.plan, &[])).unwrap();
     assert!(!report.whole && report.steady < 16 && report.steady > 0, "{report:?}");
     drop(log);

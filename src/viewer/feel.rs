@@ -7,14 +7,14 @@
 
 use super::{background::spawn, guide::Guide};
 use crate::{
-    JointVector,
-    device::{Applied, Device, Pointer, PointerInput, Reading, Scheduler},
+    control::{Clock, Patience, real_time},
+    device::{Device, Pointer, PointerInput},
     render::{
         haptic::Haptics,
         live::{Answers, Live},
         on_demand::{Exploration, OnDemand},
-        realtime::{ClearFault, Ends, HapticLoop},
-        session::{Driver, Latest},
+        realtime::{Ends, RATE, Recorder},
+        session::{ClearFault, Driver, Latest, SessionError},
         trace::Tick,
     },
     scene::HapticsSpec,
@@ -25,7 +25,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
-    thread::{JoinHandle, Thread, park_timeout},
+    thread::{JoinHandle, Thread},
     time::{Duration, Instant},
 };
 
@@ -44,7 +44,7 @@ pub struct Feel {
     ticks: rtrb::Consumer<Tick>,
     costs: rtrb::Consumer<Duration>,
     latest: triple_buffer::Output<Latest>,
-    clear: Option<ClearFault>,
+    clear: ClearFault,
     stop: Arc<AtomicBool>,
     steps: Option<mpsc::Sender<usize>>,
     stepped: mpsc::Receiver<()>,
@@ -65,10 +65,6 @@ const GUIDE_AT_REST: Duration = Duration::from_millis(10);
 /// Looks at a goal that has not moved after which the hand counts as still: half a second, in which it settles.
 const LOOKS_UNTIL_STILL: usize = 50;
 
-/// How long the loop waits at a time while the hand is still, unless its goal moves before: waking up takes longer than
-/// the ticks of that time, which are done afterwards.
-const LOOP_AT_REST: Duration = Duration::from_millis(25);
-
 /// Ticks and costs that wait for the window: sixteen seconds at 1 kHz. A window at rest looks at them once a minute;
 /// what does not fit then is a hand that has not moved.
 const RING: usize = 1 << 14;
@@ -76,7 +72,9 @@ const RING: usize = 1 << 14;
 /// Everything that the haptic thread owns.
 struct Body {
     haptics: Arc<Haptics>,
-    device: Timed,
+    device: Box<dyn Device>,
+    /// Takes what ticks cost.
+    cost: rtrb::Producer<Duration>,
     /// The contact that is solved meanwhile.
     live: Option<Live>,
     stop: Arc<AtomicBool>,
@@ -88,8 +86,41 @@ struct Body {
     give_back: mpsc::Sender<Box<dyn Device>>,
 }
 
-/// The ends of the buffers that the haptic thread returns before its first tick.
-type Seen = (rtrb::Consumer<Tick>, triple_buffer::Output<Latest>, Option<ClearFault>);
+/// The haptic thread's answer before its first tick.
+type Began = Result<(Ends, ClearFault), SessionError>;
+
+/// Steps that the caller asks for.
+struct Steps {
+    guide: Arc<Mutex<Guide>>,
+    input: Option<PointerInput>,
+    asked: mpsc::Receiver<usize>,
+    done: mpsc::Sender<()>,
+    /// Those left of the last request; none before the first.
+    left: Option<usize>,
+}
+
+impl Steps {
+    /// Waits until there is a step to be done, and moves the goal on by `period` (s). False when the caller is gone.
+    fn next(&mut self, period: f64) -> bool {
+        while self.left.is_none_or(|left| left == 0) {
+            let Ok(count) = self
+                .left
+                .map_or(Ok(()), |_| self.done.send(()))
+                .map_err(drop)
+                .and_then(|()| self.asked.recv().map_err(drop))
+            else {
+                return false;
+            };
+            self.left = Some(count);
+        }
+        self.left = self.left.map(|left| left - 1);
+        if let Some(input) = &mut self.input {
+            let goal = lock(&self.guide).follow(period);
+            let _ = input.move_to(&goal);
+        }
+        true
+    }
+}
 
 impl Feel {
     /// Starts the loop with `device`; without one, with a simulated one that is held where `guide` leads it. Contact is
@@ -118,37 +149,35 @@ impl Feel {
         let guide = Arc::new(Mutex::new(guide));
         let stop = Arc::new(AtomicBool::new(false));
         let (cost, costs) = rtrb::RingBuffer::new(RING);
-        let device = Timed { device, read: Instant::now(), cost };
         let (give_back, returned) = mpsc::channel();
         let [is_still, keeps_pace] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let (still, pace_is_kept) = (Arc::clone(&is_still), Arc::clone(&keeps_pace));
-        let body = Body { haptics, device, live, stop: Arc::clone(&stop), is_led, is_still, give_back };
+        let body = Body { haptics, device, cost, live, stop: Arc::clone(&stop), is_led, is_still, give_back };
         let (report, began) = mpsc::channel();
         let (refuse, refused) = mpsc::channel();
         let (acknowledge, stepped) = mpsc::channel();
         let (steps, asked) = mpsc::channel();
         let mut threads = Vec::new();
+        let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
         let steps = match pace {
             TickSource::Clock => {
-                let felt = spawn("haptic", move || body.by_the_clock(&report, &refuse))?;
+                let felt = spawn("haptic", move || body.run(None, &report, &refuse))?;
                 let feeling = felt.thread().clone();
                 threads.push(felt);
                 if let Some(input) = input {
-                    let leader =
-                        Leader { guide: Arc::clone(&guide), input, is_still: still, keeps_pace: pace_is_kept, feeling };
-                    let over = Arc::clone(&stop);
+                    let leader = Leader { guide: leader, input, is_still: still, keeps_pace: pace_is_kept, feeling };
                     threads.push(spawn("guide", move || leader.lead(&over))?);
                 }
                 None
             }
             TickSource::Steps => {
-                let leader = Arc::clone(&guide);
-                threads.push(spawn("haptic", move || body.by_steps(&leader, input, &report, &asked, &acknowledge))?);
+                let asked = Steps { guide: leader, input, asked, done: acknowledge, left: None };
+                threads.push(spawn("haptic", move || body.run(Some(asked), &report, &refuse))?);
                 Some(steps)
             }
         };
         let ended = "the haptic thread ended before its first tick; start haptize again".to_owned();
-        let (ticks, latest, clear) = began.recv().map_err(|_| ended)??;
+        let (Ends { ticks, latest }, clear) = began.recv().map_err(|_| ended)?.map_err(|error| error.to_string())?;
         Ok(Self {
             guide,
             ticks,
@@ -199,9 +228,7 @@ impl Feel {
 
     /// Lets the loop start again after a fault.
     pub fn clear_fault(&self) {
-        if let Some(clear) = &self.clear {
-            clear.ask();
-        }
+        self.clear.ask();
     }
 
     /// The next tick that has not been seen.
@@ -291,96 +318,47 @@ impl Leader {
 }
 
 impl Body {
-    fn by_the_clock(mut self, report: &mpsc::Sender<Result<Seen, String>>, refuse: &mpsc::Sender<Vec<String>>) {
-        let scheduler = self.device.scheduler();
-        let goes_on = || !self.stop.load(Ordering::Acquire);
-        match HapticLoop::new(&self.haptics, &mut self.device, self.live) {
-            Err(error) => drop(report.send(Err(error.to_string()))),
-            Ok((mut body, Ends { ticks, latest, clear, .. })) => {
-                drop(report.send(Ok((ticks, latest, Some(clear)))));
-                match scheduler {
-                    None => {
-                        drop(refuse.send(body.begin()));
-                        while goes_on() {
-                            if self.is_still.load(Ordering::Acquire) {
-                                body.tick_in_arrears(|| park_timeout(LOOP_AT_REST));
-                            } else if self.is_led {
-                                body.tick_relaxed();
-                            } else {
-                                body.tick();
-                            }
+    /// Runs the loop by `steps`, or else by the device's clock.
+    fn run(mut self, mut steps: Option<Steps>, report: &mpsc::Sender<Began>, refuse: &mpsc::Sender<Vec<String>>) {
+        let (haptics, stop, is_led, is_still) = (&self.haptics, &self.stop, self.is_led, &self.is_still);
+        let patience = || {
+            let waits = if is_still.load(Ordering::Acquire) {
+                Patience::Rests
+            } else if is_led {
+                Patience::Sleeps
+            } else {
+                Patience::Spins
+            };
+            (!stop.load(Ordering::Acquire)).then_some(waits)
+        };
+        let period = haptics.period();
+        let clock = match &steps {
+            Some(_) => Ok(Clock::Steps(period)),
+            None => Clock::of(self.device.as_ref(), period, RATE, &patience),
+        };
+        let (mut recorder, ends) = Recorder::new(haptics.joints());
+        let driver = Driver::new(haptics, self.device.as_mut(), self.live);
+        match clock.map_err(SessionError::from).and_then(|clock| Ok((clock, driver?))) {
+            Err(error) => drop(report.send(Err(error))),
+            Ok((mut clock, mut driver)) => {
+                drop(report.send(Ok((ends, driver.controller.clear()))));
+                drop(refuse.send(clock.begin()));
+                let mut goes_on = || steps.as_mut().is_none_or(|steps| steps.next(period));
+                if goes_on() {
+                    let stopped = driver.pace(&mut clock, &mut |_, record, paced| {
+                        recorder.take(record, paced);
+                        if let Some(began) = paced.began {
+                            // Unread costs of the last seconds are as good as newer ones.
+                            let _ = self.cost.push(real_time::now() - began);
                         }
-                    }
-                    Some(scheduler) => {
-                        drop(refuse.send(body.called_by(scheduler.as_ref(), |_| goes_on())));
-                    }
+                        goes_on()
+                    });
+                    stopped.into_iter().for_each(|stopped| drop(refuse.send(vec![stopped])));
                 }
             }
         }
         // Whoever is gone needs no device.
-        let _ = self.give_back.send(self.device.device);
-    }
-
-    fn by_steps(
-        mut self,
-        guide: &Mutex<Guide>,
-        mut input: Option<PointerInput>,
-        report: &mpsc::Sender<Result<Seen, String>>,
-        asked: &mpsc::Receiver<usize>,
-        done: &mpsc::Sender<()>,
-    ) {
-        let mut driver = match Driver::new(&self.haptics, &mut self.device, self.live) {
-            Ok(driver) => driver,
-            Err(error) => return drop(report.send(Err(error.to_string()))),
-        };
-        let (mut record, ticks) = rtrb::RingBuffer::new(RING);
-        let start = JointVector::zeros(self.haptics.joints());
-        let (mut latest, read) =
-            triple_buffer::triple_buffer(&Latest { time: 0.0, proxy: start, device: start, share: 0.0 });
-        drop(report.send(Ok((ticks, read, None))));
-        let period = self.haptics.period();
-        for count in asked {
-            for _ in 0..count {
-                if let Some(input) = &mut input {
-                    let goal = lock(guide).follow(period);
-                    let _ = input.move_to(&goal);
-                }
-                let (tick, state) = driver.tick(period, period);
-                latest.write(state);
-                // Ticks beyond the ring are not recorded; steps are far shorter than it.
-                let _ = record.push(tick);
-            }
-            if done.send(()).is_err() {
-                break;
-            }
-        }
-        drop(driver);
-        let _ = self.give_back.send(self.device.device);
-    }
-}
-
-/// The device, with the time from its reading to the torque that answers it: what a tick costs.
-struct Timed {
-    device: Box<dyn Device>,
-    read: Instant,
-    cost: rtrb::Producer<Duration>,
-}
-
-impl Device for Timed {
-    fn read(&mut self, elapsed: f64) -> Reading {
-        let reading = self.device.read(elapsed);
-        self.read = Instant::now();
-        reading
-    }
-
-    fn apply(&mut self, torque: &JointVector) -> Applied {
-        // Unread costs of the last seconds are as good as newer ones.
-        let _ = self.cost.push(self.read.elapsed());
-        self.device.apply(torque)
-    }
-
-    fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
-        self.device.scheduler()
+        let _ = self.give_back.send(self.device);
     }
 }
 

@@ -1,39 +1,62 @@
 //! A scan on a device, through the safety layer: what it measures is what the same rig measures without it.
 
 use crate::felt::{PERIOD, all};
+use assert_no_alloc::assert_no_alloc;
 use haptize::{
     JointVector,
     device::{
-        Applied, Coordinates, Device, DeviceRig, Failure, Guard, Halt, JointDevice, Limits, LinearMap, Reading, Script,
-        Simulated, Watchdog, relay,
+        Applied, Coordinates, Device, Failure, Guard, Halt, JointDevice, Limits, LinearMap, Reading, Scheduler, Script,
+        Simulated, Watchdog,
     },
     proxy::Chain,
     scan::{
-        LogHeader, LogWriter, Plan, Rig, RowStatus, ScanError, ScanLog, ScanRow, Session, labels,
-        simulated::SimulatedRig,
+        LogHeader, LogWriter, Plan, RowStatus, ScanError, ScanLog, ScanRow, Session, labels, simulated::SimulatedRig,
     },
     scene::{PlanAxis, PlanSpec, ScanScene},
 };
-use std::{path::Path, sync::atomic::AtomicBool};
+use std::{
+    path::Path,
+    sync::{Arc, Mutex, atomic::AtomicBool},
+};
 
-/// The simulated rig of a scan as a device: its joints, and the sponge that they touch.
-struct Sponge {
-    rig: SimulatedRig,
-    torque: JointVector,
-    position: JointVector,
+/// A device that passes its readings and torques on; the time of its own is a period a tick.
+struct Watched {
+    device: JointDevice,
+    thread: Thread,
+    /// That it was given last.
+    last: Arc<Mutex<JointVector>>,
 }
 
-impl Device for Sponge {
+impl Device for Watched {
     fn read(&mut self, elapsed: f64) -> Reading {
-        if elapsed > 0.0 {
-            self.position = self.rig.hold(&self.torque, elapsed).unwrap().position;
-        }
-        Reading { position: self.position, age: 0.0, hand: self.position }
+        self.device.read(if elapsed > 0.0 { PERIOD } else { 0.0 })
     }
 
     fn apply(&mut self, torque: &JointVector) -> Applied {
-        self.torque = *torque;
-        Applied::whole(torque)
+        *self.last.lock().unwrap() = *torque;
+        self.device.apply(torque)
+    }
+
+    fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
+        match self.thread {
+            Thread::Own => None,
+            Thread::Library(rate) => Some(Arc::new(Library(rate))),
+        }
+    }
+}
+
+/// A library that calls without a pause, whatever rate (Hz) it states. It must not be kept waiting: a tick of a scan
+/// allocates nothing.
+struct Library(f64);
+
+impl Scheduler for Library {
+    fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt> {
+        while assert_no_alloc(&mut *tick) {}
+        Ok(())
+    }
+
+    fn rate(&self) -> f64 {
+        self.0
     }
 }
 
@@ -54,8 +77,8 @@ fn scene() -> ScanScene {
 enum Thread {
     /// By the scan itself.
     Own,
-    /// By a library's thread, whose calls the scan follows.
-    Library,
+    /// By a library's thread, which says that it calls so often (Hz).
+    Library(f64),
 }
 
 /// Scans `scene` with a device of so much torque (N m) that fails as `scripts` say; its rows.
@@ -68,37 +91,37 @@ fn scan_by(thread: Thread, scene: &ScanScene, most: f64, scripts: &[Script]) -> 
     let plan = Plan::new(&scene.scan.plan, &chain).unwrap();
     let first = plan.stops[0].q;
     let rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, 7);
-    let sponge = Sponge { rig, torque: all(3, 0.0), position: first };
     let limits = Limits { effort: all(3, most), watchdog: Watchdog::None };
-    let hardware = Simulated::new(sponge, Coordinates::Joints(3), limits, scripts.to_vec());
+    let hardware = Simulated::new(rig, Coordinates::Joints(3), limits, scripts.to_vec());
     let mut guard = Guard::new(Box::new(hardware), None).unwrap();
     guard.enable().unwrap();
-    let device = JointDevice::new(guard, LinearMap::identity(3));
-    let stop = AtomicBool::new(false);
-    let mut rig = match thread {
-        Thread::Own => DeviceRig::new(device, "a device".into(), true, None, &stop, |period| period),
-        Thread::Library => {
-            let (mut ticker, device) = relay(device);
-            let call = move |period| {
-                ticker.tick(period);
-                period
-            };
-            DeviceRig::new(device, "a device".into(), true, None, &stop, call)
-        }
-    };
+    let last = Arc::new(Mutex::new(all(3, 1.0)));
+    let mut device =
+        Watched { device: JointDevice::new(guard, LinearMap::identity(3)), thread, last: Arc::clone(&last) };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     let header = LogHeader {
-        rig: rig.description(),
+        rig: "a device".into(),
         simulated: true,
         guided: false,
         joints: labels(&chain),
         scene: scene.text.clone(),
     };
     let mut log = LogWriter::create(&path, &header).unwrap();
-    let mut session =
-        Session { spec: &scene.scan, chain: &chain, rig: &mut rig, log: &mut log, stop: &stop, progress: &mut |_| () };
+    let mut session = Session {
+        spec: &scene.scan,
+        chain: &chain,
+        device: &mut device,
+        against_time: thread != Thread::Own,
+        header: &header,
+        log: &mut log,
+        stop: &AtomicBool::new(false),
+        progress: &mut |_| (),
+    };
     let result = session.scan(&plan, &[]).map(drop);
+    if !matches!(result, Err(ScanError::Clock(_))) {
+        assert_eq!(*last.lock().unwrap(), all(3, 0.0), "the last torque");
+    }
     drop(log);
     (result, ScanLog::read(&path).unwrap().rows)
 }
@@ -134,60 +157,17 @@ fn a_device_that_a_library_s_thread_drives_measures_the_same() {
     let scene = scene();
     let (result, own) = scan(&scene, 3.0, &[]);
     result.unwrap();
-    let (result, relayed) = scan_by(Thread::Library, &scene, 3.0, &[]);
+    let library = Thread::Library(scene.scan.control.rate);
+    let (result, called) = scan_by(library, &scene, 3.0, &[]);
     result.unwrap();
-    assert_eq!(relayed.len(), own.len());
-    for (a, b) in own.iter().zip(&relayed) {
-        assert_eq!(b.status, RowStatus::Steady);
-        // Friction and noise of the rig leave this much between two visits of a place.
-        let apart = |a: &JointVector, b: &JointVector| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
-        assert!(apart(&a.torque, &b.torque) < 0.02 && apart(&a.q, &b.q) < 0.02, "{a:?}\n{b:?}");
-    }
+    let measured =
+        |rows: &[ScanRow]| -> Vec<ScanRow> { rows.iter().map(|row| ScanRow { time: 0.0, ..*row }).collect() };
+    assert_eq!(measured(&called), measured(&own), "to the last bit");
     let unplugged = Script { failure: Failure::Unplugged, from: 1.0, until: f64::INFINITY };
-    let (result, _) = scan_by(Thread::Library, &scene, 3.0, &[unplugged]);
+    let (result, _) = scan_by(library, &scene, 3.0, &[unplugged]);
     assert!(result.unwrap_err().to_string().contains("unplugged"));
-}
-
-#[test]
-fn a_library_s_thread_lets_go_where_the_scan_is_silent_and_when_it_is_over() {
-    let hand = haptize::device::SimulatedHand::holding(
-        &haptize::scene::HandSpec { stiffness: all(3, 20.0), damping: all(3, 0.4), inertia: all(3, 2e-3) },
-        &all(3, 1e-3),
-        &all(3, 0.03),
-        haptize::device::Motion::through(&[haptize::scene::Waypoint { time: 0.0, q: all(3, 0.0) }], 3).unwrap(),
-    );
-    let limits = Limits { effort: all(3, 1.0), watchdog: Watchdog::None };
-    let hardware = Simulated::new(hand.unwrap(), Coordinates::Joints(3), limits, Vec::new());
-    let mut guard = Guard::new(Box::new(hardware), None).unwrap();
-    guard.enable().unwrap();
-    let (mut ticker, mut device) = relay(JointDevice::new(guard, LinearMap::identity(3)));
-    // Nothing was asked for yet: no torque, and no complaint.
-    for _ in 0..20 {
-        assert!(ticker.tick(PERIOD));
+    for rate in [0.5, 2.0, 1.001].map(|part| part * scene.scan.control.rate) {
+        let refused = scan_by(Thread::Library(rate), &scene, 3.0, &[]).0.unwrap_err().to_string();
+        assert!(refused.contains(&format!("rate = {rate} in [scan.control]")), "{refused}");
     }
-    for _ in 0..800 {
-        device.apply(&all(3, 0.3));
-        assert!(ticker.tick(PERIOD));
-    }
-    let held = device.apply(&all(3, 0.3));
-    assert_eq!((held.torque, held.halt), (all(3, 0.3), None));
-    // The order before was for the next call; ten more go on with it.
-    let mut silent = 0;
-    while device_torque(&mut ticker, &mut device) > 0.0 {
-        silent += 1;
-        assert!(silent < 20);
-    }
-    assert!((10..=12).contains(&silent), "{silent} calls");
-    let held = device.apply(&all(3, 0.3));
-    assert_eq!((held.torque, held.halt), (all(3, 0.0), Some(Halt::Late)));
-    // It comes back, from zero.
-    ticker.tick(PERIOD);
-    let held = device.apply(&all(3, 0.3));
-    assert!(held.halt.is_none() && held.torque[0] < 0.01, "{held:?}");
-}
-
-/// Torque after a call without an order (N m).
-fn device_torque(ticker: &mut haptize::device::Ticker, device: &mut haptize::device::Relayed) -> f64 {
-    ticker.tick(PERIOD);
-    device.held().torque[0]
 }

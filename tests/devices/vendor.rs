@@ -6,21 +6,29 @@ use crate::{
     felt::{PERIOD, all, half_space_loop},
 };
 use haptize::{
+    JointVector,
+    control::{Clock, ControlLoop, Controller, Patience},
     dataset::JointLabel,
     device::{
-        Device, Guard, Halt, Hardware, JointDevice, LONGEST_AGE, LinearMap, RAMP_TIME, TipDevice, WARM_TIME, Watchdog,
+        Applied, Device, Guard, Halt, Hardware, JointDevice, LONGEST_AGE, LinearMap, RAMP_TIME, Reading, TipDevice,
+        WARM_TIME, Watchdog,
         vendor::{ForceDimension, OpenHaptics},
-        with_scheduler,
     },
     proxy::Chain,
     render::{
-        realtime::{self, Options},
+        realtime::{self, Options, RATE},
         session::Plan,
     },
     scene::DeviceSpec,
 };
 use libloading::Library;
-use std::{path::PathBuf, process::Command, sync::OnceLock, thread, time::Duration};
+use std::{
+    path::PathBuf,
+    process::Command,
+    sync::OnceLock,
+    thread,
+    time::{Duration, Instant},
+};
 use tempfile::TempDir;
 
 /// Builds the stand-in `name` once; each test loads a copy of its own, with a state of its own.
@@ -292,26 +300,43 @@ fn a_scheduler_that_hangs_or_fails_ends_the_session() {
     }
 }
 
+/// A controller that pushes always alike.
+struct Push;
+
+impl Controller for Push {
+    type Record = Applied;
+
+    fn joints(&self) -> usize {
+        3
+    }
+
+    fn answer(&mut self, _: &Reading, _: f64, _: f64) -> JointVector {
+        all(3, 0.05)
+    }
+
+    fn held(&mut self, applied: &Applied) -> Applied {
+        *applied
+    }
+}
+
 #[test]
-fn a_scan_follows_the_scheduler_s_thread_and_leaves_no_torque() {
+fn any_controller_follows_the_scheduler_s_thread_and_leaves_no_torque() {
     let library = StandIn::new("hd");
     let mut device = session(&library);
-    let scheduler = device.scheduler().unwrap();
-    assert_eq!(scheduler.rate(), 1000.0);
-    device.read(0.0);
-    let seconds = with_scheduler(device, scheduler.as_ref(), |mut device, mut wait| {
-        let mut time = 0.0;
-        // A busy machine may bring it back to zero; it rises again then.
-        while device.apply(&all(3, 0.05)).torque != all(3, 0.05) {
-            let elapsed = wait.wait(PERIOD);
-            assert!(elapsed >= 0.75 * PERIOD, "{elapsed}");
-            device.read(elapsed);
-            time += elapsed;
-        }
-        time
+    assert_eq!(device.scheduler().unwrap().rate(), 1000.0);
+    let goes_on = || Some(Patience::Spins);
+    let clock = Clock::of(&device, PERIOD, RATE, &goes_on).unwrap();
+    let mut held = 0;
+    // A busy machine may bring it back to zero; it rises again then.
+    let begin = Instant::now();
+    let timing = ControlLoop::of(Push, &mut device).run(clock, |_, applied, _| {
+        held += usize::from(applied.torque == all(3, 0.05));
+        held == 0
     });
-    assert!(seconds.unwrap() >= RAMP_TIME, "it rises from zero");
+    assert!(timing.refused.is_empty() && held == 1, "{timing:?}");
+    assert!(begin.elapsed().as_secs_f64() >= RAMP_TIME, "it rises from zero");
     assert_eq!(library.effort(), 0.0);
+    drop(device);
     let log = library.log();
     let at = |call: &str| log.iter().position(|line| line == call).unwrap_or_else(|| panic!("{call}: {log:?}"));
     assert!(at("hdEnable") < at("hdScheduleAsynchronous") && at("hdScheduleAsynchronous") < at("hdDisable"));
@@ -319,20 +344,13 @@ fn a_scan_follows_the_scheduler_s_thread_and_leaves_no_torque() {
 }
 
 #[test]
-fn a_scan_learns_that_the_scheduler_hangs() {
+fn any_controller_learns_that_the_scheduler_hangs() {
     let library = StandIn::new("hd");
-    let device = session(&library);
-    let scheduler = device.scheduler().unwrap();
-    let halt = with_scheduler(device, scheduler.as_ref(), |mut device, mut wait| {
-        library.set(2, 0);
-        loop {
-            let halt = device.apply(&all(3, 0.05)).halt;
-            match halt {
-                Some(halt) if halt != Halt::Late => break halt,
-                _ => device.read(wait.wait(PERIOD)),
-            };
-        }
-    });
-    assert!(matches!(halt.unwrap(), Halt::Stale | Halt::Over));
+    let mut device = session(&library);
+    let goes_on = || Some(Patience::Spins);
+    let clock = Clock::of(&device, PERIOD, RATE, &goes_on).unwrap();
+    library.set(2, 0);
+    let timing = ControlLoop::of(Push, &mut device).run(clock, |_, _, _| true);
+    assert!(timing.refused[0].contains("own thread stopped"), "{timing:?}");
     assert_eq!(library.effort(), 0.0);
 }

@@ -91,7 +91,7 @@ struct Scripted {
 
 impl Scripted {
     fn new(positions: impl IntoIterator<Item = JointVector>) -> Self {
-        let reading = |position| Reading { position, age: 0.0, hand: position };
+        let reading = Reading::at;
         Self { readings: positions.into_iter().map(reading).collect(), next: 0, torque: vector(&[]) }
     }
 }

@@ -42,7 +42,7 @@ fn marked(solved_meanwhile: bool) -> Trace {
         device: both(),
         proxy: both(),
         device_torque: both(),
-        applied: Applied { torque: both(), clamps: Clamps::SIZE, halt: Some(Halt::Late) },
+        applied: Applied { torque: both(), clamps: Clamps::SIZE, halt: Some(Halt::Stale) },
         sample: Sample {
             torque: both(),
             index: 0.125,
@@ -80,7 +80,7 @@ fn files_of_a_session_have_the_columns_that_programs_know() {
     let mut written = Vec::new();
     trace.write_ticks(&mut written).unwrap();
     let text = String::from_utf8(written).unwrap();
-    let (fault, halt) = (Fault::Late, Halt::Late);
+    let (fault, halt) = (Fault::Late, Halt::Stale);
     let start = "3,0.25,5,0.375,7,0.5,9,0.625,11,0.75,13,0.875,0.125,1,7,136";
     let end = "0,-0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,,0,0,0";
     assert_eq!(text, format!("{TRACE_FILE}0,{start},{fault},1,{halt},{end}\n1.5,{start},,1,{halt},{end}\n"));

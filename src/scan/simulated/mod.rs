@@ -13,9 +13,9 @@ mod sponge;
 pub use hand::Hand;
 pub use sponge::{NodeContact, Sponge};
 
-use super::rig::{Rig, RigError, RigReading};
 use crate::{
     JointVector,
+    device::{Applied, Device, Halt, Reading},
     joint_matrix::solve_positive,
     proxy::{Chain, Pose},
     random::Random,
@@ -39,6 +39,8 @@ pub struct SimulatedRig {
     pose: Pose,
     position: JointVector,
     velocity: JointVector,
+    /// That it is driven by.
+    torque: JointVector,
     time: f64,
     noise: Random,
     hand: Option<Hand>,
@@ -56,6 +58,7 @@ impl SimulatedRig {
             contacts: vec![NodeContact::default(); chain.nodes.len()],
             pose: chain.new_pose(),
             velocity: JointVector::zeros(position.len()),
+            torque: JointVector::zeros(position.len()),
             position,
             time: 0.0,
             noise: Random::new(seed),
@@ -127,27 +130,39 @@ impl SimulatedRig {
     }
 }
 
-impl Rig for SimulatedRig {
-    fn hold(&mut self, torque: &JointVector, period: f64) -> Result<RigReading, RigError> {
-        if !torque.is_finite() {
-            return Err(RigError(format!("torque {torque:?} is not a number")));
-        }
-        let mut actual = *torque;
-        for value in actual.iter_mut() {
-            *value += self.spec.noise * self.noise.normal();
-        }
-        for _ in 0..STEPS {
-            self.step(&actual, period / STEPS as f64);
+impl Device for SimulatedRig {
+    fn read(&mut self, elapsed: f64) -> Reading {
+        if elapsed > 0.0 {
+            let mut actual = self.torque;
+            for value in actual.iter_mut() {
+                *value += self.spec.noise * self.noise.normal();
+            }
+            for _ in 0..STEPS {
+                self.step(&actual, elapsed / STEPS as f64);
+            }
         }
         let mut position = self.position;
         for (joint, value) in position.iter_mut().enumerate() {
             *value = self.encoded(joint);
         }
         let held = self.hand.as_ref().is_some_and(|hand| hand.holds(self.time));
-        Ok(RigReading { time: self.time, position, held })
+        Reading { held, ..Reading::at(position) }
     }
 
-    fn description(&self) -> String {
+    fn apply(&mut self, torque: &JointVector) -> Applied {
+        if torque.is_finite() {
+            self.torque = *torque;
+            return Applied::whole(torque);
+        }
+        self.torque = JointVector::zeros(torque.len());
+        Applied { halt: Some(Halt::NotFinite), ..Applied::whole(&self.torque) }
+    }
+}
+
+impl SimulatedRig {
+    /// Returns a description for logs, one line.
+    #[must_use]
+    pub fn description(&self) -> String {
         let SpecimenSpec { size, cover, .. } = self.spec;
         let cover = match cover {
             Cover::Bare => "bare",
@@ -159,9 +174,5 @@ impl Rig for SimulatedRig {
             size.y * 1e3,
             size.z * 1e3
         )
-    }
-
-    fn is_simulated(&self) -> bool {
-        true
     }
 }
