@@ -23,7 +23,7 @@ use crate::{
     contact::RESIDUAL_FLOOR,
     dataset::Grid,
     memory,
-    store::{Gathered, Levels, Place, Root, record::width},
+    store::{Cell, Gathered, Levels, Place, Root, record::width, with_joints},
 };
 use std::sync::Arc;
 
@@ -109,6 +109,28 @@ impl GridRoot {
         let nodes = Self { grid: grid.clone(), points: data.points, records };
         Ok(Potential::new(Arc::new(nodes), free_energy))
     }
+
+    /// The points at the corners of the cell whose first corner lies on the lines `low`.
+    fn corners<const C: usize>(&self, low: &Place) -> [usize; C] {
+        let mut points = [0; C];
+        for (a, (axis, &low)) in self.grid.axes.iter().zip(low).enumerate() {
+            let (near, far) = points.split_at_mut(1 << a);
+            for (near, far) in near.iter_mut().zip(far) {
+                *near = *near * axis.count + low as usize;
+                *far = *near + usize::from(axis.count > 1);
+            }
+        }
+        points
+    }
+
+    fn around_in<const C: usize, const W: usize>(&self, fade: f64, cell: &Cell, root: &Root) -> Around {
+        let (points, weights) = (self.corners::<C>(&cell.low), cell.weights::<C>());
+        let corners = || points.into_iter().zip(weights);
+        let linear: f64 = corners().map(|(point, weight)| weight * self.records[point * W].max(0.0)).sum();
+        let depth = root.value.max(0.0);
+        let share = if depth < linear { depth / linear } else { 1.0 };
+        Around { share, ..Around::of(&self.points, fade, corners()) }
+    }
 }
 
 /// The change of `number` at `point` of `grid` in a step along `axis`, between the neighbours that have one: central, or
@@ -140,15 +162,7 @@ impl Levels for GridRoot {
         _: u64,
         numbers: &mut [[f64; C]; W],
     ) -> Gathered {
-        let mut points = [0; C];
-        for (a, (axis, &low)) in self.grid.axes.iter().zip(low).enumerate() {
-            let (near, far) = points.split_at_mut(1 << a);
-            for (near, far) in near.iter_mut().zip(far) {
-                *near = *near * axis.count + low as usize;
-                *far = *near + usize::from(axis.count > 1);
-            }
-        }
-        for (corner, point) in points.into_iter().enumerate() {
+        for (corner, point) in self.corners::<C>(low).into_iter().enumerate() {
             let record = &self.records[point * W..(point + 1) * W];
             numbers.iter_mut().zip(record).for_each(|(number, entry)| number[corner] = *entry);
         }
@@ -159,11 +173,8 @@ impl Levels for GridRoot {
 impl RootNodes for GridRoot {
     /// Contact forces, which grow like w, are lessened from the multilinear interpolation of w over the corners in
     /// contact to w: they end with it at the boundary.
-    fn around(&self, q: &[f64], root: &Root) -> Around {
-        let stencil = self.grid.locate(q);
-        let value = |point: usize| self.records[point * width(self.grid.joints())].max(0.0);
-        let linear: f64 = stencil.corners().map(|(point, weight)| weight * value(point)).sum();
-        let depth = root.value.max(0.0);
-        Around { share: if depth < linear { depth / linear } else { 1.0 }, ..Around::of(&self.points, &stencil) }
+    fn around(&self, q: &[f64], cell: &Cell, root: &Root) -> Around {
+        let fade = self.grid.fade(q);
+        with_joints!(self.grid.joints(), D => self.around_in::<{ 1 << D }, { width(D) }>(fade, cell, root))
     }
 }

@@ -89,7 +89,7 @@ impl Interpolant for Linear {
     fn sample(&self, q: &[f64], _: u64) -> (Sample, u32) {
         let stencil = self.grid.locate(q);
         let at = with_joints!(self.grid.joints(), D => self.at::<D>(&stencil));
-        let mut around = Around::of(&self.points, &stencil);
+        let mut around = Around::of(&self.points, stencil.fade, stencil.corners());
         around.flags.set(Flags::LAYER, at.held < 1.0);
         around.share = at.held;
         (around.sample(at.torque, at.energy, at.depth > 0.0), 1)

@@ -5,7 +5,7 @@ use super::{FieldError, Flags, Sample};
 use crate::{
     JointVector,
     contact::Status,
-    dataset::{Dataset, Grid, Stencil},
+    dataset::{Dataset, Grid},
     input::GREATEST_INPUT,
     joint_matrix,
 };
@@ -65,12 +65,11 @@ pub(super) struct Around {
 }
 
 impl Around {
-    /// What `points` tell of the configuration of `stencil`.
-    pub fn of(points: &[Point], stencil: &Stencil) -> Self {
-        let flags = Flags::empty();
-        let mut around = Self { fade: stencil.fade, share: 1.0, flags, index: 0.0, contact_nodes: 0 };
+    /// What `points` tell at `corners` with their weights.
+    pub fn of(points: &[Point], fade: f64, corners: impl Iterator<Item = (usize, f64)>) -> Self {
+        let mut around = Self { fade, share: 1.0, flags: Flags::empty(), index: 0.0, contact_nodes: 0 };
         let mut heaviest = 0.0;
-        for (point, weight) in stencil.corners().filter(|(_, weight)| *weight > 0.0) {
+        for (point, weight) in corners.filter(|(_, weight)| *weight > 0.0) {
             let corner = points[point];
             around.flags |= corner.flags;
             around.index += if corner.touching { weight } else { 0.0 };

@@ -25,15 +25,15 @@ use super::{
 use crate::{
     JointVector,
     dataset::Grid,
-    store::{Levels, Place, Root, Store, added, beyond, root},
+    store::{Cell, Levels, Place, Root, Store, added, beyond, root},
 };
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Nodes of the root of an energy.
 pub(super) trait RootNodes: Levels {
-    /// What they tell of `q` beside `root`, which was interpolated there.
-    fn around(&self, q: &[f64], root: &Root) -> Around;
+    /// What they tell of `q`, in `cell` of the base, beside `root`, which was interpolated there.
+    fn around(&self, q: &[f64], cell: &Cell, root: &Root) -> Around;
 }
 
 /// The potential over nodes of its root.
@@ -63,8 +63,9 @@ impl<N: RootNodes> Potential<N> {
 
 impl<N: RootNodes> Interpolant for Potential<N> {
     fn sample(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
-        let root = root(&*self.nodes, q, horizon);
-        let around = self.nodes.around(q, &root);
+        let cell = Cell::of(self.nodes.base(), q);
+        let root = root(&*self.nodes, cell, horizon);
+        let around = self.nodes.around(q, &cell, &root);
         (around.sample(root.torque(), self.free_energy + root.energy(), root.value > 0.0), root.whole)
     }
 
@@ -75,7 +76,7 @@ impl<N: RootNodes> Interpolant for Potential<N> {
 
 impl RootNodes for Store {
     /// A store does not say what it does not keep: how many nodes of the object touch.
-    fn around(&self, q: &[f64], root: &Root) -> Around {
+    fn around(&self, q: &[f64], _: &Cell, root: &Root) -> Around {
         let mut flags = Flags::empty();
         flags.set(Flags::ABSENT, root.whole == 0);
         flags.set(Flags::UNCONVERGED, root.failed);

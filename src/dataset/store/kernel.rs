@@ -24,6 +24,7 @@ pub(super) const fn rates(joints: usize) -> usize {
 }
 
 /// Weights of f_0, g_0, f_1, g_1 at fraction `x` of a cell, and their derivatives by x.
+#[inline(always)]
 fn basis(x: f64) -> [[f64; 4]; 2] {
     let far = x * x * (3.0 - 2.0 * x);
     let rate = 6.0 * x * (1.0 - x);
@@ -39,11 +40,10 @@ pub(super) fn hermite<const D: usize, const C: usize, const W: usize, const R: u
     let mut derived = [0.0; R];
     let numbers = numbers.as_flattened_mut();
     for axis in (0..D).rev() {
-        let [weights, slopes] = basis(fractions[axis]);
-        contract_into(numbers, C, &mut derived[rates(axis)..], axis, &slopes);
-        contract(numbers, C, axis, &weights);
+        let both = basis(fractions[axis]);
+        contract_both(numbers, C, &mut derived[rates(axis)..], axis, &both);
         for above in axis + 1..D {
-            contract(&mut derived[rates(above)..], 1 << above, axis, &weights);
+            contract(&mut derived[rates(above)..], 1 << above, axis, &both[0]);
         }
     }
     (numbers[0], std::array::from_fn(|axis| derived[rates(axis)]))
@@ -64,15 +64,18 @@ macro_rules! with_half {
 }
 
 /// Contracts `axis`, the last one left, of `numbers`, `stride` a kind.
+#[inline(always)]
 fn contract(numbers: &mut [f64], stride: usize, axis: usize, weights: &[f64; 4]) {
     with_half!(axis, contract_half(numbers, stride, axis, weights));
 }
 
-/// [`contract`] into `to`, `2^axis` a kind.
-fn contract_into(from: &[f64], stride: usize, to: &mut [f64], axis: usize, weights: &[f64; 4]) {
-    with_half!(axis, contract_half_into(from, stride, to, axis, weights));
+/// [`contract`] with the first four weights, and with the others into `to`, `2^axis` a kind.
+#[inline(always)]
+fn contract_both(numbers: &mut [f64], stride: usize, to: &mut [f64], axis: usize, both: &[[f64; 4]; 2]) {
+    with_half!(axis, contract_half_both(numbers, stride, to, axis, both));
 }
 
+#[inline(always)]
 fn contract_half<const HALF: usize>(numbers: &mut [f64], stride: usize, axis: usize, weights: &[f64; 4]) {
     let &[near, rise, far, fall] = weights;
     let mut with_slope = |set: usize, along: usize| {
@@ -91,22 +94,33 @@ fn contract_half<const HALF: usize>(numbers: &mut [f64], stride: usize, axis: us
     }
 }
 
-fn contract_half_into<const HALF: usize>(from: &[f64], stride: usize, to: &mut [f64], axis: usize, weights: &[f64; 4]) {
-    let &[near, rise, far, fall] = weights;
-    let sides = |set: usize| from[set * stride..][..2 * HALF].split_at(HALF);
+#[inline(always)]
+fn contract_half_both<const HALF: usize>(
+    numbers: &mut [f64],
+    stride: usize,
+    to: &mut [f64],
+    axis: usize,
+    [weights, rates]: &[[f64; 4]; 2],
+) {
     let mut with_slope = |set: usize, along: usize| {
-        let ((own, beyond), (slopes, slopes_beyond)) = (sides(set), sides(along));
+        let (own, slopes) = numbers.split_at_mut(along * stride);
+        let (own, beyond) = own[set * stride..][..2 * HALF].split_at_mut(HALF);
+        let (slopes, slopes_beyond) = slopes[..2 * HALF].split_at(HALF);
         let to = to[set * HALF..][..HALF].iter_mut().zip(own).zip(beyond).zip(slopes).zip(slopes_beyond);
         for ((((to, own), beyond), slope), slope_beyond) in to {
-            *to = near * own + rise * slope + far * beyond + fall * slope_beyond;
+            let sum =
+                |[near, rise, far, fall]: &[f64; 4]| near * *own + rise * slope + far * *beyond + fall * slope_beyond;
+            (*to, *own) = (sum(rates), sum(weights));
         }
     };
     with_slope(0, slope(axis));
     (0..axis).for_each(|b| with_slope(slope(b), mixed(axis, b)));
     for set in (0..axis).flat_map(|b| (0..b).map(move |c| mixed(b, c))) {
-        let (own, beyond) = sides(set);
+        let (own, beyond) = numbers[set * stride..][..2 * HALF].split_at_mut(HALF);
         let to = to[set * HALF..][..HALF].iter_mut().zip(own).zip(beyond);
-        to.for_each(|((to, own), beyond)| *to = near * own + far * beyond);
+        for ((to, own), beyond) in to {
+            (*to, *own) = (rates[0] * *own + rates[2] * *beyond, weights[0] * *own + weights[2] * *beyond);
+        }
     }
 }
 

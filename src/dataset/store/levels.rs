@@ -96,23 +96,21 @@ macro_rules! with_joints {
 }
 pub(crate) use with_joints;
 
-/// The function at `q`, one entry per joint, of the first `horizon` blocks of `nodes`; beyond the grid that at its
-/// border. Never allocates, locks or waits.
-pub(crate) fn root<N: Levels>(nodes: &N, q: &[f64], horizon: u64) -> Root {
+/// The function in a `cell` of the base, of the first `horizon` blocks of `nodes`. Never allocates, locks or waits.
+pub(crate) fn root<N: Levels>(nodes: &N, cell: Cell, horizon: u64) -> Root {
     use kernel::rates;
-    with_joints!(nodes.base().joints(), D => sum::<N, D, { 1 << D }, { width(D) }, { rates(D) }>(nodes, q, horizon))
+    with_joints!(nodes.base().joints(), D => sum::<N, D, { 1 << D }, { width(D) }, { rates(D) }>(nodes, cell, horizon))
 }
 
 /// Adds up the levels, each from the `W` numbers at the `C` corners of its cell. `C = 2^D`, `W = width(D)`,
 /// `R = rates(D)`.
 fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize>(
     nodes: &N,
-    q: &[f64],
+    mut cell: Cell,
     horizon: u64,
 ) -> Root {
     let mut root = Root { value: 0.0, slopes: JointVector::zeros(D), levels: 0, whole: 0, failed: false };
     let mut numbers = [[0.0; C]; W];
-    let mut cell = Cell::of(nodes.base(), q);
     for level in 0..nodes.count() {
         if level > 0 {
             cell.halve();

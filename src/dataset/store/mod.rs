@@ -35,6 +35,7 @@ mod sync;
 
 pub use block::{Block, Nodes};
 pub use file::check_memory;
+pub(crate) use space::Cell;
 pub use space::{Place, Space, SpaceError};
 
 use crate::{MAX_JOINTS, dataset::Grid};
@@ -257,7 +258,7 @@ impl Store {
     /// those on which it rests, which were published before it.
     #[must_use]
     pub fn sample_within(&self, q: &[f64], horizon: u64) -> Root {
-        levels::root(self, q, horizon)
+        levels::root(self, Cell::of(self.base(), q), horizon)
     }
 
     /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).

@@ -58,7 +58,7 @@ pub enum SpaceError {
 
 /// The cell around a configuration at one level.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cell {
+pub(crate) struct Cell {
     /// Its first corner.
     pub low: Place,
     /// Fractions of the cell along each axis, 0 to 1.
@@ -239,6 +239,18 @@ impl Cell {
             (cell.low[a], cell.fractions[a]) = (low as u32, fraction);
         }
         cell
+    }
+
+    /// Multilinear weights of its `C = 2^d` corners.
+    pub fn weights<const C: usize>(&self) -> [f64; C] {
+        let mut weights = [1.0; C];
+        for (a, &fraction) in self.fractions.iter().enumerate().take(const { C.ilog2() as usize }) {
+            let (near, far) = weights.split_at_mut(1 << a);
+            for (near, far) in near.iter_mut().zip(far) {
+                (*near, *far) = (*near * (1.0 - fraction), *near * fraction);
+            }
+        }
+        weights
     }
 
     /// The cell of the level above, finer by half, around the same configuration. Halving is exact.
