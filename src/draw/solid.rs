@@ -44,13 +44,15 @@ impl Cone {
     #[must_use]
     pub fn arrow(tail: DVec3, span: DVec3, radius: f64, colour: Colour) -> Vec<Self> {
         let length = span.length();
-        let head = (HEAD * radius).min(HEAD_SHARE * length);
-        if !(head > 0.0 && head.is_finite()) {
+        if !(length > 0.0 && length.is_finite()) {
             return Vec::new();
         }
+        let head = (HEAD * radius).min(HEAD_SHARE * length);
         let (neck, shaft) = (tail + span * (1.0 - head / length), radius.min(head / HEAD));
+        // Its round end touches the tail.
+        let begin = tail + span * (shaft / length);
         vec![
-            Self::rod([tail, neck], shaft, colour),
+            Self::rod([begin, neck], shaft, colour),
             Self { ends: [neck, tail + span], radii: [HEAD_RADIUS * head, 0.0], colour },
         ]
     }

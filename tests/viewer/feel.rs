@@ -240,9 +240,9 @@ fn gains_that_differ_between_joints_are_multiplied_together() {
 }
 
 #[test]
-fn each_interpolation_is_felt_and_has_its_cost_of_a_tick() {
+fn each_interpolation_is_felt() {
     // Torques from shortly before contact on, with the last of these choices.
-    let approach = |choices: &[&str]| -> (Window, Vec<f64>) {
+    let approach = |choices: &[&str]| -> Vec<f64> {
         let mut window = Window::sphere();
         choices.iter().for_each(|choice| window.choose("Interpolation", choice));
         window.click("Press");
@@ -251,21 +251,15 @@ fn each_interpolation_is_felt_and_has_its_cost_of_a_tick() {
             window.advance(0.02);
             window.torque()
         });
-        let torques = torques.collect();
-        (window, torques)
+        torques.collect()
     };
-    let linear = approach(&[]).1;
+    let linear = approach(&[]);
     let greatest = linear.iter().copied().fold(0.0, f64::max);
     let most = |other: &[f64]| linear.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / greatest;
     assert!(greatest > 0.1, "{greatest}");
-    let difference = most(&approach(&["potential"]).1);
+    let difference = most(&approach(&["potential"]));
     assert!(difference > 1e-2 && difference < 0.5, "{difference}");
-    let (window, again) = approach(&["potential", "linear"]);
-    assert_eq!(most(&again), 0.0);
-    let costs = window.harness.query_all_by_label_contains("µs a tick").next().unwrap().accesskit_node();
-    let costs = costs.value().or(costs.label()).unwrap();
-    let numbers: Vec<f64> = costs.split([' ', ',', '\n']).filter_map(|word| word.parse().ok()).collect();
-    assert!(numbers.len() == 2 && numbers.iter().all(|cost| *cost > 0.0), "{costs}");
+    assert_eq!(most(&approach(&["potential", "linear"])), 0.0);
 }
 
 #[test]
