@@ -212,15 +212,17 @@ impl Session<'_> {
                 .map_err(|_| ScanError::Rig("the thread that drives the device ended unexpectedly".into()))?;
         } else {
             driver.run(clock, |scan, row, _| {
+                let is_measured = row.is_some();
                 row.into_iter().for_each(&mut take);
-                !scan.is_over() && !failed.load(Ordering::Relaxed)
+                let is_stopped = failed.load(Ordering::Relaxed) || is_measured && stop.load(Ordering::Relaxed);
+                !scan.is_over() && !is_stopped
             });
         }
         let controller = &driver.controller;
         kept?;
         report.seconds = controller.seconds();
         match controller.end() {
-            None if controller.is_over() => Ok(report),
+            None if controller.is_over() || !against_time => Ok(report),
             None if stop.load(Ordering::Relaxed) => {
                 Err(ScanError::Rig("interrupted; --resume goes on after the last point in the log".into()))
             }
