@@ -125,9 +125,11 @@ fn decimals(step: f64) -> usize {
 }
 
 /// Numbers below are written with a power of ten.
+#[cfg(feature = "viewer")]
 const LEAST_DECIMAL: f64 = 1e-4;
 
 /// Writes `value` with the digits that tell it from one a `step` away, by itself: without a factor in the axis title.
+#[cfg(feature = "viewer")]
 pub(crate) fn apart(value: f64, step: f64) -> String {
     // Rounded: a step of 0.001 has a logarithm beside -3.
     let decade = |x: f64| (x.abs().log10() + 1e-9).floor();
