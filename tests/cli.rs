@@ -202,7 +202,8 @@ fn a_missing_or_broken_file_is_named() {
             let message = text(&output.stderr);
             assert_eq!(output.status.code(), Some(1), "{command:?}: {message}");
             assert!(message.starts_with(&format!("haptize: {file}: ")), "{command:?}: {message}");
-            assert!(message.contains("; "), "{command:?} says what to do: {message}");
+            let remedy = if file == "." { ": give a file in it" } else { "; " };
+            assert!(message.contains(remedy), "{command:?} says what to do: {message}");
         }
     }
     assert!(!folder.path().join("cut.csv").exists(), "nothing is exported from a broken file");

@@ -169,7 +169,10 @@ fn refusal(path: &Path) -> Option<Error> {
     if let Some(error) = &opened {
         let text = error.to_string();
         assert!(text.starts_with(&path.display().to_string()), "{text}");
-        assert!(["bake", "check the path"].iter().any(|remedy| text.contains(remedy)), "{text}");
+        assert!(
+            ["bake", "check the path", "give a file", "give that"].iter().any(|remedy| text.contains(remedy)),
+            "{text}"
+        );
     }
     opened
 }

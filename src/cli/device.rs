@@ -3,11 +3,13 @@
 use super::{Failure, Report, interrupt, keyboard::Keyboard, tell};
 use crate::{
     control::{CheckReport, PUSH_SHARE, Phase, check},
-    device::{Address, Guard, Key, Kind, LIMIT_SHARE, Watchdog, open},
+    device::{Address, Guard, Key, Kind, LIMIT_SHARE, OpenError, Watchdog, open},
+    scene::Rendering,
 };
 use serde_json::json;
 use std::{
     fmt::{self, Write},
+    path::PathBuf,
     sync::atomic::Ordering,
 };
 
@@ -43,6 +45,9 @@ struct Check {
     /// Drive each coordinate in turn with at most a tenth of the device's torque, while the space bar is held.
     #[arg(long)]
     push: bool,
+    /// Keep within the `effort_limit` that [device] in this scene gives, too.
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
 }
 
 /// Longest phase (s).
@@ -83,6 +88,11 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
     let hardware = open(&arguments.device, None)?;
     let mut guard =
         Guard::new(hardware, arguments.push.then_some(key)).map_err(|halt| format!("{}: {halt}", arguments.device))?;
+    let spec = arguments.scene.as_ref().map(Rendering::load).transpose()?.map(|scene| scene.device);
+    if let Some(limit) = spec.and_then(|spec| spec.effort_limit) {
+        let device = guard.coordinates().count();
+        guard.limit_each(&limit).map_err(|given| OpenError::EffortLimit { given, device })?;
+    }
     let _keyboard = if arguments.push { Some(Keyboard::start(input)?) } else { None };
     tell(format_args!("haptize: {}", guard.description()));
     let phases: &[Phase] = if arguments.push {
@@ -105,12 +115,16 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
     let unit = coordinates.effort_unit();
     let description = guard.description();
     let limit: Vec<f64> = limits.effort.to_vec();
+    let most: Vec<f64> = guard.most().to_vec();
     drop(guard);
     interrupt::over();
     let whole = reports.len() == phases.len() && reports.iter().all(CheckReport::is_good);
     let mut text = String::new();
     writeln!(text, "{}: {description}", arguments.device)?;
-    writeln!(text, "  limit        {limit:.4?} {unit}; used: {LIMIT_SHARE} of it, {PUSH_SHARE} in this check")?;
+    writeln!(
+        text,
+        "  limit        {limit:.4?} {unit}; used: {LIMIT_SHARE} of it, {PUSH_SHARE} in this check, at most {most:.4?}"
+    )?;
     match limits.watchdog {
         Watchdog::After(time) => {
             writeln!(text, "  watchdog     the device lets go {:.0} ms after the last command", 1e3 * time)?
@@ -130,6 +144,7 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
         "device": arguments.device.to_string(),
         "description": description,
         "limit": limit,
+        "most": most,
         "watchdog": limits.watchdog,
         "phases": reports,
     });

@@ -129,7 +129,12 @@ fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Resul
         write!(text, " to {:.0e}", from.tolerance)?;
     }
     writeln!(text, " on {backend} ({adapter})")?;
-    from.notices.iter().try_for_each(|notice| writeln!(text, "  notice       {}", escaped(notice)))
+    notices(text, &from.notices)
+}
+
+/// Writes what the user of a dataset should know, a line each.
+pub fn notices(text: &mut String, notices: &[String]) -> fmt::Result {
+    notices.iter().try_for_each(|notice| writeln!(text, "  notice       {}", escaped(notice)))
 }
 
 /// Writes how much a contact point feels the mesh, and what to do about it.

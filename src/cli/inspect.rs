@@ -130,6 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         });
         writeln!(text, "stored at point {point}, q = {}: {status}", numbers(&stored))?;
         writeln!(text, "  torque       {}", efforts(dataset.torque(point), &chain))?;
+        info::notices(&mut text, &dataset.provenance.notices)?;
     }
     Ok(Report { text, json, whole: true })
 }

@@ -322,8 +322,7 @@ impl<'a> Sweep<'a> {
         // The part grows beside the file that a link leads to: only there can that be replaced.
         let output = &dataset::resolved(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
         dataset::check_place(output).map_err(SweepError::Output)?;
-        let claim = Claim::new(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
-        let _claim = claim.ok_or_else(|| SweepError::Busy { path: output.into() })?;
+        check_unclaimed(output)?;
         let mut binding = self.binding();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;
@@ -352,6 +351,7 @@ impl<'a> Sweep<'a> {
         let map = part.map().map_err(failed)?;
         let mut table = part.table(&map, self.shape.width())?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
+        check_unclaimed(output)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let shape = Shape { with_forces: self.with_forces, ..self.shape };
         let results = Results::new(&table, report.points, shape, stop);
@@ -456,6 +456,12 @@ impl<'a> Sweep<'a> {
 /// Checks that `scene` has a grid.
 pub(super) fn check_given(scene: &Scene) -> Result<(), SweepError> {
     if scene.grid.axes.is_empty() { Err(SweepError::NoGrid) } else { Ok(()) }
+}
+
+/// Checks that no session on demand keeps the file `output`: it would be lost, or the dataset written over.
+fn check_unclaimed(output: &Path) -> Result<(), SweepError> {
+    // Where nobody can claim it nobody can write it either, which is told by who tries.
+    if matches!(Claim::new(output), Ok(None)) { Err(SweepError::Busy { path: output.into() }) } else { Ok(()) }
 }
 
 /// CRC-32 of all that contact knows of `object`.

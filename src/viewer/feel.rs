@@ -345,13 +345,15 @@ impl Body {
                 drop(refuse.send(clock.begin()));
                 let mut goes_on = || steps.as_mut().is_none_or(|steps| steps.next(period));
                 if goes_on() {
+                    // By steps a tick begins where the one before ended, or a step was asked for.
+                    let mut begun = real_time::now();
                     let stopped = driver.pace(&mut clock, &mut |_, record, paced| {
                         recorder.take(record, paced);
-                        if let Some(began) = paced.began {
-                            // Unread costs of the last seconds are as good as newer ones.
-                            let _ = self.cost.push(real_time::now() - began);
-                        }
-                        goes_on()
+                        // Unread costs of the last seconds are as good as newer ones.
+                        let _ = self.cost.push(real_time::now() - paced.began.unwrap_or(begun));
+                        let goes_on = goes_on();
+                        begun = real_time::now();
+                        goes_on
                     });
                     stopped.into_iter().for_each(|stopped| drop(refuse.send(vec![stopped])));
                 }

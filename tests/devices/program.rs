@@ -64,6 +64,20 @@ fn a_check_reads_then_holds_zero_torque_and_finds_what_fails() {
     assert_eq!(report["phases"][1]["phase"], "zero-torque");
     assert!(report["phases"][1]["fresh"].as_u64().unwrap() > 20, "{report}");
     assert_eq!(report["watchdog"], "none");
+    // A scene lowers what is used of the device's limit, and names as many coordinates.
+    let limited = |count: usize| {
+        let limits = vec!["0.001"; count].join(", ");
+        let scene = format!("{FINGER}\n[device]\neffort_limit = [{limits}]\n");
+        std::fs::write(folder.path().join("limited.toml"), scene).unwrap();
+        let check = ["device", "check", "simulated", "--seconds", "0.1", "--json", "--scene", "limited.toml"];
+        haptize(folder.path(), &check)
+    };
+    let used = |report: &serde_json::Value| report["most"][0].as_f64().unwrap();
+    let count = report["limit"].as_array().unwrap().len();
+    assert!(used(&report) > 0.001, "{report}");
+    assert_eq!(used(&json(&limited(count))), 0.001);
+    let refused = limited(count + 1);
+    assert_eq!(refused.status.code(), Some(1), "{}", String::from_utf8_lossy(&refused.stdout));
 
     let output = haptize(folder.path(), &["device", "check", "simulated:unplugged@0.1", "--seconds", "0.2", "--json"]);
     assert_eq!(output.status.code(), Some(1));
