@@ -76,7 +76,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay the session in this file and check that it matches bit for bit. One on demand is replayed with the dataset
-    /// that it left.
+    /// that it left, if its scene names all gains.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
     replay: Option<PathBuf>,
     /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
@@ -363,7 +363,12 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Stri
     let trace = recording.replay(&setup.haptics, graphics.as_mut(), labels(&dataset.grid))?;
     if let Some(tick) = recording.first_difference(&trace) {
         let time = trace.ticks.get(tick).map_or(0.0, |tick| tick.time);
-        let why = "the dataset, its scene or the version of haptize is another one than when it was recorded";
+        let why = if trace.solved_meanwhile {
+            "the scene or the version of haptize is another one than when it was recorded, or the scene leaves out gains, \
+             such as proxy_damping, which followed from less than is explored now: name them in [haptics], and record again"
+        } else {
+            "the dataset, its scene or the version of haptize is another one than when it was recorded"
+        };
         return Err(
             format!("{}: the session differs from tick {tick}, at {time:.4} s, on: {why}", file.display()).into()
         );
