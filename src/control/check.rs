@@ -15,7 +15,7 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-/// Time between ticks (s).
+/// Time between ticks, unless the device's own thread has one (s).
 const PERIOD: f64 = 1e-3;
 
 /// Rate of the push (Hz): slow enough to be followed by eye and hand.
@@ -148,7 +148,7 @@ impl Controller for Check {
 /// Runs `phase` for `seconds` on `guard`, or until `stop` is raised. Motors are switched on where the phase needs them.
 ///
 /// # Errors
-/// When the device refuses to switch its motors on, or calls at another rate.
+/// When the device refuses to switch its motors on, or there is no memory.
 pub fn check(guard: &mut Guard, phase: Phase, seconds: f64, stop: &AtomicBool) -> Result<CheckReport, CheckError> {
     let count = guard.coordinates().count();
     if phase == Phase::ZeroTorque {
@@ -170,11 +170,79 @@ pub fn check(guard: &mut Guard, phase: Phase, seconds: f64, stop: &AtomicBool) -
     let check = Check { seconds, most: *guard.most(), report, last: None };
     let goes_on = || (!stop.load(Ordering::Relaxed)).then_some(Patience::Sleeps);
     let mut device = Bare(guard);
-    let mut clock = Clock::of(&device, PERIOD, "its check", &goes_on)?;
+    // No scene says how often: at the device's own rate, whatever it is.
+    let period = device.scheduler().map_or(PERIOD, |scheduler| 1.0 / scheduler.rate());
+    let mut clock = Clock::of(&device, period, "the check", &goes_on)?;
     let mut driver = ControlLoop::of(check, &mut device);
     // In an ordinary thread: it is to be careful, not punctual.
     driver.pace(&mut clock, &mut |check, (), _| {
         check.report.seconds < check.seconds && check.report.tally.stopped.is_none()
     });
     Ok(driver.controller.report.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::{Command, Coordinates, Hardware, Limits, Measurement, Watchdog};
+
+    /// One slide whose library calls 250 times a second.
+    struct Slow;
+
+    impl Hardware for Slow {
+        fn description(&self) -> String {
+            "a slow library".into()
+        }
+
+        fn coordinates(&self) -> Coordinates {
+            Coordinates::Joints(1)
+        }
+
+        fn limits(&self) -> Limits {
+            Limits { effort: JointVector::from_slice(&[1.0]), watchdog: Watchdog::None }
+        }
+
+        fn enable(&mut self) -> Result<(), Halt> {
+            Ok(())
+        }
+
+        fn read(&mut self, _: f64) -> Result<Measurement, Halt> {
+            Ok(Measurement::plain(JointVector::zeros(1), 0.0))
+        }
+
+        fn write(&mut self, _: &JointVector) -> Result<Command, Halt> {
+            Ok(Command::Whole)
+        }
+
+        fn scheduler(&self) -> Option<Arc<dyn Scheduler>> {
+            Some(Arc::new(Library))
+        }
+
+        fn release(&mut self) {}
+    }
+
+    struct Library;
+
+    impl Scheduler for Library {
+        fn run(&self, tick: &mut (dyn FnMut() -> bool + Send)) -> Result<(), Halt> {
+            while tick() {
+                std::thread::sleep(std::time::Duration::from_secs_f64(1.0 / self.rate()));
+            }
+            Ok(())
+        }
+
+        fn rate(&self) -> f64 {
+            250.0
+        }
+    }
+
+    #[test]
+    fn a_device_is_checked_at_the_rate_of_its_own_library() {
+        let mut guard = Guard::new(Box::new(Slow), None).unwrap();
+        let stop = AtomicBool::new(false);
+        for phase in [Phase::Reading, Phase::ZeroTorque] {
+            let report = check(&mut guard, phase, 0.1, &stop).unwrap();
+            assert!(report.seconds >= 0.1 && report.fresh > 1 && report.is_good(), "{report:?}");
+        }
+    }
 }

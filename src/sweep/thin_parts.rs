@@ -8,13 +8,13 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Configurations in cells of a store that are looked at (1): if a hundredth of the cells pass a middle, all of these
-/// miss them in one case of seven.
+/// Configurations in cells of a store that are looked at (1): a part that is passed in a twentieth of the cells is
+/// passed at more than [`LEAST_SHARE`] of these in all but one case of four hundred.
 const LOOKED_AT: usize = 200;
 
 /// Share of them that has to pass a middle for it to be told (1): of the 64 corners of a cell of six joints one may lie
-/// far behind the surface of a part that the arm never gets through. A thin part is passed in a fifth of the cells, or
-/// more.
+/// far behind the surface of a part that the arm never gets through. The plates of the tests are passed in a fifth of
+/// the cells, or more.
 const LEAST_SHARE: f64 = 0.01;
 
 /// Seed of these configurations.
