@@ -83,12 +83,12 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
     if !(arguments.seconds > 0.0 && arguments.seconds <= LONGEST) {
         return Err(format!("cannot check for {} s: give --seconds between 0 and {LONGEST}", arguments.seconds).into());
     }
+    let spec = arguments.scene.as_ref().map(Rendering::load).transpose()?.map(|scene| scene.device);
     let stop = interrupt::stop_flag_of_device();
     let (key, input) = Key::new();
     let hardware = open(&arguments.device, None)?;
     let mut guard =
         Guard::new(hardware, arguments.push.then_some(key)).map_err(|halt| format!("{}: {halt}", arguments.device))?;
-    let spec = arguments.scene.as_ref().map(Rendering::load).transpose()?.map(|scene| scene.device);
     if let Some(limit) = spec.and_then(|spec| spec.effort_limit) {
         let device = guard.coordinates().count();
         guard.limit_each(&limit).map_err(|given| OpenError::EffortLimit { given, device })?;
