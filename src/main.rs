@@ -1,8 +1,5 @@
 //! The command line of haptize; see [`haptize::cli`].
 
-#[global_allocator]
-static ALLOCATOR: haptize::cli::Remembering = haptize::cli::Remembering;
-
 fn main() -> std::process::ExitCode {
     // Mesa's device-select layer reorders adapters, which haptize ranks itself, and prints errors where there is no
     // display. This is the layer's own switch.

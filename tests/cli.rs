@@ -493,8 +493,8 @@ fn no_output_destroys_an_input() {
         (&["bake", "finger.toml", "-o", "kept.csv"], "not a dataset"),
         (&["bake", "finger.toml", "-o", "o"], "no regular file"),
         (&["export", "finger.haptize", "--format", "csv", "-o", "hard.haptize"], "also an input"),
-        (&["export", "finger.haptize", "--format", "npz", "-o", "kept.csv"], "not an archive"),
-        (&["export", "finger.haptize", "--format", "csv", "-o", "finger.toml"], "not a table"),
+        (&["export", "finger.haptize", "--format", "npz", "-o", "kept.csv"], "not a table or figure"),
+        (&["export", "finger.haptize", "--format", "csv", "-o", "finger.toml"], "not a table or figure"),
         (&["play", "finger.haptize", "--record", "finger.haptize"], "also an input"),
         (&["play", "finger.haptize", "--motion", "o/trace.csv", "-o", "o"], "also an input"),
         (&["gridize", "move.csv", "--step", "0.1", "-o", "move.csv"], "also an input"),
@@ -506,6 +506,11 @@ fn no_output_destroys_an_input() {
         assert!(contents() == before, "{arguments:?}");
     }
     assert_eq!(haptize(folder.path(), &["bake", "finger.toml"]).status.code(), Some(0), "its own output is replaced");
+    let forced = ["export", "finger.haptize", "--format", "csv", "-o", "kept.csv", "--force"];
+    json(folder.path(), &[&forced[..], &["--json"]].concat());
+    assert!(!std::fs::read_to_string(path("kept.csv")).unwrap().starts_with("# a session"));
+    let forced = haptize(folder.path(), &["bake", "finger.toml", "-o", "finger.toml", "--force"]);
+    assert_eq!(forced.status.code(), Some(1), "an input is no output, whatever is asked");
 }
 
 /// What is solved at a configuration does not depend on the grid, and a scene need not have one.

@@ -110,7 +110,7 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     // Words are no number that could differ.
     assert!(!row("normal force under a fabric over bare, at the same depth").differs());
     let page = comparison.markdown();
-    assert_eq!(page.lines().count(), comparison.figures.len() + comparison.rows.len() + 5);
+    assert_eq!(page.lines().count(), comparison.figures.len() + comparison.rows.len() + 7);
     assert!(page.contains("| 4.1 | nodes of the sphere | 102 | 102 | the same |"), "{page}");
     assert!(page.contains("| 3,472 | 320 | 5 x 8 lines of 8 levels |"), "{page}");
 

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report, max_error,
-    output::{self, Kind},
+    output::{self, Content},
     reach, refine,
     shard::ShardChoice,
     watch::{configurations, describe, touches, warn, watched},
@@ -90,8 +90,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file")?)
             .with_extension("haptize"),
     };
-    let earlier = output::check(&output, Kind::Dataset, [arguments.scene.as_path()])?;
-    output::check(&Sweep::growing_of(&output), Kind::Dataset, [])?;
+    let earlier = output::check(&output, Content::Dataset, [arguments.scene.as_path()])?;
+    output::check(&Sweep::growing_of(&output), Content::Dataset, [])?;
     let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
     if let (Some(aim), Some(levels)) = (arguments.max_error, arguments.refine) {
         let wanted = refine::RefinementGoal { aim, levels, most: arguments.max_points, output: &output };

@@ -5,8 +5,8 @@ mod handler {
     use crate::device::serial;
     use std::{ptr, sync::OnceLock};
 
-    /// What a crash raises, `abort` apart, which `memory` answers.
-    const SIGNALS: [libc::c_int; 4] = [libc::SIGSEGV, libc::SIGBUS, libc::SIGILL, libc::SIGFPE];
+    /// What a crash raises; memory that runs out ends in an `abort`.
+    const SIGNALS: [libc::c_int; 5] = [libc::SIGSEGV, libc::SIGBUS, libc::SIGILL, libc::SIGFPE, libc::SIGABRT];
 
     /// What answered each signal before: the standard library tells of a stack that overflows.
     static BEFORE: [OnceLock<libc::sigaction>; SIGNALS.len()] = [const { OnceLock::new() }; SIGNALS.len()];

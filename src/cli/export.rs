@@ -2,7 +2,7 @@
 
 use super::{
     Failure, Report,
-    output::{self, Kind},
+    output::{self, Content},
 };
 use crate::dataset::{Dataset, Format};
 use std::path::PathBuf;
@@ -30,16 +30,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let dataset = Dataset::open(&arguments.dataset)?;
     let beside = || arguments.dataset.with_extension(arguments.format.extension());
     let output = arguments.output.clone().unwrap_or_else(beside);
-    let kind = match arguments.format {
-        Format::Npz => Kind::Archive,
-        Format::Hdf5 => Kind::Hdf5,
-        Format::Csv => Kind::Table,
-    };
     let inputs = [arguments.dataset.as_path()];
-    let earlier = output::check(&output, kind, inputs)?;
+    let earlier = output::check(&output, Content::Product, inputs)?;
     let beside = arguments.format.beside(&output).filter(|file| file.symlink_metadata().is_ok());
     if let Some(beside) = &beside {
-        output::check(beside, kind, inputs)?;
+        output::check(beside, Content::Product, inputs)?;
     }
     let files = dataset.export(&output, arguments.format)?;
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();

@@ -3,7 +3,7 @@
 use super::{
     Failure, Report,
     bar::Bar,
-    output::{self, Folder, Kind},
+    output::{self, Content, Folder},
 };
 use crate::{
     MAX_JOINTS,
@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let output = output(arguments)?;
     let inputs = arguments.logs.iter().chain(&arguments.against).chain(&arguments.columns).chain(&arguments.scene);
     let inputs = inputs.map(PathBuf::as_path);
-    let earlier = output::check(&output, Kind::Dataset, inputs.clone())?;
+    let earlier = output::check(&output, Content::Dataset, inputs.clone())?;
     let names = report::FIGURES.into_iter().chain(FIGURES);
     let folder = arguments.figures.as_ref().map(|folder| Folder::check(folder, names, inputs)).transpose()?;
     if let Some(folder) = &folder {

@@ -6,7 +6,7 @@ use crate::{
     dataset::{Axis, Dataset, MeasuredError, Refinement, Summary},
     names::escaped,
     object::Skin,
-    scene::{Material, ObjectSpec, Rendering, SkinSpec, arm_note},
+    scene::{Material, ObjectSpec, Rendering, SkinSpec},
 };
 use glam::DVec3;
 use std::{
@@ -150,12 +150,11 @@ pub fn error(text: &mut String, measured: Option<&MeasuredError>, aim: Option<f6
     for (number, line) in measured.lines().iter().enumerate() {
         writeln!(text, "  {:<12} {line}", if number == 0 { "error" } else { "" })?;
     }
-    let MeasuredError { configurations, left_out, torque, lever_arm, .. } = measured;
+    let MeasuredError { configurations, left_out, torque, unit, .. } = measured;
     if *configurations == 0 {
         return Ok(());
     }
-    let arm = arm_note(*lever_arm);
-    write!(text, "  {:<12} of the rms torque, {torque:.4} N m{arm}, at {configurations} random configurations", "")?;
+    write!(text, "  {:<12} of the rms torque, {torque:.4} {unit}, at {configurations} random configurations", "")?;
     if *left_out > 0 {
         write!(text, "; {left_out} left out, which did not converge")?;
     }

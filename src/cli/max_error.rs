@@ -2,7 +2,7 @@
 
 use super::{Failure, Report, tell, watch};
 use crate::{
-    scene::{Scene, arm_note},
+    scene::Scene,
     sweep::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
 };
 use std::{fmt::Write, path::Path};
@@ -55,12 +55,13 @@ pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> 
 fn state(pilot: &Pilot, choice: &Choice) {
     let best = pilot.prospects.first().map_or(0.0, |best| best.order);
     tell(format_args!(
-        "haptize: for an rms error of {:.2e} N m ({:.2} % of {:.4} N m{}): {} grid points, {:.4} apart, `{}`, \
+        "haptize: for an rms error of {:.2e} {} ({:.2} % of {:.4} {}): {} grid points, {:.4} apart, `{}`, \
          solved to {:.0e}; the pilot's errors fell with the spacing to the power {best:.2}",
         pilot.aim,
+        pilot.unit.name(),
         100.0 * pilot.relative,
         pilot.torque,
-        arm_note(pilot.lever_arm),
+        pilot.unit,
         choice.points,
         choice.spacing,
         choice.interpolation,

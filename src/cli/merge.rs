@@ -4,7 +4,7 @@ use super::{
     Failure, Report,
     bar::Bar,
     info, interrupt,
-    output::{self, Kind},
+    output::{self, Content},
     tell, watch,
 };
 use crate::names::escaped;
@@ -42,8 +42,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let output = &arguments.output;
     let inputs = arguments.parts.iter().map(PathBuf::as_path);
-    let earlier = output::check(output, Kind::Dataset, inputs)?;
-    output::check(&Sweep::growing_of(output), Kind::Dataset, [])?;
+    let earlier = output::check(output, Content::Dataset, inputs)?;
+    output::check(&Sweep::growing_of(output), Content::Dataset, [])?;
     let merge = Merge::gather(&arguments.parts)?;
     merge.notes.iter().for_each(|note| tell(format_args!("haptize: {note}")));
     let missing = merge.missing();

@@ -38,7 +38,6 @@ mod interrupt;
 mod keyboard;
 mod man;
 mod max_error;
-mod memory;
 mod merge;
 mod motion;
 mod new;
@@ -56,8 +55,6 @@ mod shard;
 mod shell;
 mod view;
 mod watch;
-
-pub use memory::Remembering;
 
 use crate::{
     names,
@@ -91,6 +88,9 @@ struct CommandLine {
     /// Print one machine-readable JSON object on standard output.
     #[arg(long, global = true)]
     json: bool,
+    /// Replace files that haptize did not write, too.
+    #[arg(long, global = true)]
+    force: bool,
 }
 
 #[derive(Subcommand)]
@@ -182,8 +182,6 @@ struct Report {
 /// Runs what the command line `arguments`, the program's name first, asks for; returns the exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    // Before the command line is parsed, which takes memory.
-    memory::tell_shortage(arguments.iter().any(|argument| argument == "--json"));
     // A name that forges a line would be printed again and again.
     let mut texts = arguments.iter().skip(1).map(|argument| argument.to_string_lossy());
     if let Some(argument) = texts.find(|argument| argument.contains(names::is_disruptive)) {
@@ -198,6 +196,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(parsed) => parsed,
         Err(error) => return usage(&error),
     };
+    if line.force {
+        output::force();
+    }
     crash::let_go_first();
     // What refines a grid keeps nothing before its end.
     let refines = matches.subcommand().is_some_and(|(_, given)| given.try_contains_id("refine").unwrap_or(false));

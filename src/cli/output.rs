@@ -1,92 +1,84 @@
-//! The files that a command writes: never over one of its inputs, over a file of another kind, or over what is no
-//! regular file. A file that is replaced is reported.
+//! The files that a command writes: never over one of its inputs, over what is no regular file, or, without `--force`,
+//! over a file of another program. A file that is replaced is reported.
 
 use super::Failure;
-use crate::dataset::{may_be_dataset, resolved};
+use crate::{
+    dataset::{may_be_dataset, resolved},
+    render::recording::SIGNATURE as SESSION,
+    scan::SIGNATURE,
+};
 use serde_json::{Value, json};
 use std::{
     fmt::Write,
     fs::{self, File},
     io::{self, Read},
     path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
     time::SystemTime,
 };
 
-/// Kind of a file that a command writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A dataset.
-    Dataset,
-    /// A log, a recording or a table, in CSV.
-    Table,
-    /// NumPy's archive.
-    Archive,
-    /// HDF5.
-    Hdf5,
-    /// A manual page.
-    Page,
-    /// A picture, in PNG.
-    Picture,
-    /// A drawing, in SVG.
-    Drawing,
-    /// Text for people or programs: Markdown, HTML, JSON.
-    Text,
-    /// A log of joint states in MCAP.
-    Mcap,
+/// Bytes at the start of a file by which those of haptize are known: its name stands there in most.
+const START: u64 = 1024;
+
+/// How logs of scans and records of sessions begin.
+const LOGS: [&[u8]; 2] = [SIGNATURE.as_bytes(), SESSION.as_bytes()];
+
+/// Whether the command line has `--force`.
+static FORCED: AtomicBool = AtomicBool::new(false);
+
+/// From now on a file is replaced whoever wrote it.
+pub fn force() {
+    FORCED.store(true, Ordering::Relaxed);
 }
 
-impl Kind {
-    /// Returns whether a log at `path` is MCAP by its extension, or else a table.
-    #[must_use]
-    pub fn of_log(path: &Path) -> Self {
-        let mcap = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
-        if mcap { Self::Mcap } else { Self::Table }
-    }
+/// What a file of haptize holds. One is replaced by its like alone, since not all of them can be made again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// A dataset.
+    Dataset,
+    /// The log of a scan, or the record of a session.
+    Log,
+    /// What is made of these again: tables, archives, figures, pages.
+    Product,
+}
 
-    /// Kind of the figure or table called `name`, by its extension.
-    fn of(name: &Path) -> Self {
-        match name.extension().and_then(|extension| extension.to_str()) {
-            Some("haptize") => Self::Dataset,
-            Some("png") => Self::Picture,
-            Some("svg") => Self::Drawing,
-            Some("csv") => Self::Table,
-            Some("1") => Self::Page,
-            _ => Self::Text,
-        }
-    }
-
-    /// Whether the file at `path` that begins with `start` is of this kind.
-    fn is(self, path: &Path, start: &[u8]) -> bool {
-        match self {
-            Self::Dataset => may_be_dataset(start),
-            Self::Archive => start.starts_with(b"PK"),
-            Self::Hdf5 => start.starts_with(b"\x89HDF\r\n\x1a\n"),
-            Self::Page => start.starts_with(b"."),
-            Self::Picture => start.starts_with(b"\x89PNG"),
-            Self::Drawing => start.windows(4).any(|word| word == b"<svg"),
-            Self::Text => !start.contains(&0),
-            Self::Mcap => start.starts_with(b"\x89MCAP"),
-            Self::Table => {
-                let other = ["toml", "obj", "ply", "stl", "msh", "md", "json"];
-                let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-                !start.contains(&0) && !other.iter().any(|other| extension == *other)
-            }
+impl Content {
+    /// What the file that begins with `start` holds, if haptize wrote it, or it is a table like one of its own.
+    fn of(start: &[u8]) -> Option<Self> {
+        let holds = |word: &[u8]| start.windows(word.len()).any(|part| part == word);
+        let begins = |magic: &[u8]| start.starts_with(magic);
+        let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
+        // A scene may name haptize, and is the work of a person.
+        let text = holds(b"haptize") && !begins(b"#") || begins(b"# The paper's");
+        let archive = begins(b"PK") && holds(b"torque.npy");
+        let hdf5 = begins(b"\x89HDF") && holds(b"torque");
+        match () {
+            () if may_be_dataset(start) => Some(Self::Dataset),
+            () if log => Some(Self::Log),
+            () if text || archive || hdf5 || is_table(start) => Some(Self::Product),
+            () => None,
         }
     }
 
     fn name(self) -> &'static str {
         match self {
             Self::Dataset => "a dataset",
-            Self::Table => "a table",
-            Self::Archive => "an archive",
-            Self::Hdf5 => "an HDF5 file",
-            Self::Page => "a manual page",
-            Self::Picture => "a PNG picture",
-            Self::Drawing => "an SVG drawing",
-            Self::Text => "text",
-            Self::Mcap => "an MCAP file",
+            Self::Log => "a log of haptize",
+            Self::Product => "a table or figure of haptize",
         }
     }
+}
+
+/// Whether a log at `path` is MCAP, by its extension.
+pub fn is_mcap(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
+}
+
+/// Whether the first line names columns with units, as in `time [s],gap [m]`.
+fn is_table(start: &[u8]) -> bool {
+    let line = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let columns = str::from_utf8(line).unwrap_or_default().split(',');
+    columns.filter(|column| column.contains(" [") && column.trim_end().ends_with(']')).count() > 1
 }
 
 /// A file that is going to be replaced, where there is one.
@@ -102,32 +94,47 @@ impl Earlier {
     }
 }
 
-/// Checks that a file of `kind` may be written to `output` by a command that reads `inputs`.
+/// Checks that a file which holds `content` may be written to `output` by a command that reads `inputs`.
 ///
 /// # Errors
 /// When `output` is one of the inputs, by whatever name, is there and no regular file, may not be read or written to,
-/// holds something of another kind, or lies in a folder that cannot be written to.
-pub fn check<'a>(output: &Path, kind: Kind, inputs: impl IntoIterator<Item = &'a Path>) -> Result<Earlier, Failure> {
+/// holds something else (but with `--force`), or lies in a folder that cannot be written to.
+pub fn check<'a>(
+    output: &Path,
+    content: Content,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<Earlier, Failure> {
     let refused = |why: &str| format!("{}: {why}; nothing is written: name another file", output.display());
-    let file = resolved(output).map_err(|error| refused(&error.to_string()))?;
-    probe(output, file.parent().unwrap_or(Path::new("")))?;
-    let Ok(there) = fs::metadata(&file) else { return Ok(Earlier(None)) };
+    let Some((file, there)) = replaceable(output)? else { return Ok(Earlier(None)) };
     if inputs.into_iter().any(|input| is_same(output, input)) {
         return Err(refused("this is also an input, which would be lost").into());
     }
+    let mut start = Vec::new();
+    File::open(&file)
+        .and_then(|file| file.take(START).read_to_end(&mut start))
+        .map_err(|error| refused(&format!("there is a file already that cannot be read ({error})")))?;
+    if !start.is_empty() && Content::of(&start) != Some(content) && !FORCED.load(Ordering::Relaxed) {
+        let what = content.name();
+        return Err(refused(&format!("there is a file already that is not {what} (--force replaces it)")).into());
+    }
+    Ok(Earlier(Some((there.len(), there.modified().unwrap_or(SystemTime::UNIX_EPOCH)))))
+}
+
+/// Returns the file that writing to `output` replaces, links followed, if there is one.
+///
+/// # Errors
+/// When it is there and no regular file or may not be written to, or lies in a folder that cannot be written to.
+pub fn replaceable(output: &Path) -> Result<Option<(PathBuf, fs::Metadata)>, Failure> {
+    let refused = |why: &str| format!("{}: {why}; nothing is written: name another file", output.display());
+    let file = resolved(output).map_err(|error| refused(&error.to_string()))?;
+    probe(output, file.parent().unwrap_or(Path::new("")))?;
+    let Ok(there) = fs::metadata(&file) else { return Ok(None) };
     if there.permissions().readonly() {
         return Err(
             refused("there is a file already that may not be written to (chmod u+w lets it be replaced)").into()
         );
     }
-    let mut start = Vec::new();
-    File::open(&file)
-        .and_then(|file| file.take(512).read_to_end(&mut start))
-        .map_err(|error| refused(&format!("there is a file already that cannot be read ({error})")))?;
-    if !start.is_empty() && !kind.is(output, &start) {
-        return Err(refused(&format!("there is a file already that is not {}", kind.name())).into());
-    }
-    Ok(Earlier(Some((there.len(), there.modified().unwrap_or(SystemTime::UNIX_EPOCH)))))
+    Ok(Some((file, there)))
 }
 
 /// A folder that a command fills with files whose names it knows.
@@ -154,7 +161,8 @@ impl Folder {
         let files: Vec<PathBuf> = names.into_iter().map(|name| path.join(name)).collect();
         let earlier: Vec<PathBuf> = files.iter().filter(|file| fs::symlink_metadata(file).is_ok()).cloned().collect();
         for file in &earlier {
-            check(file, Kind::of(file), inputs.clone())?;
+            let is_dataset = file.extension().is_some_and(|extension| extension == "haptize");
+            check(file, if is_dataset { Content::Dataset } else { Content::Product }, inputs.clone())?;
         }
         Ok(Self { path: path.to_owned(), files, earlier })
     }

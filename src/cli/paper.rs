@@ -5,7 +5,7 @@ use super::{
     bar::Bar,
     gridize::{self, Source},
     interrupt, motion,
-    output::Folder,
+    output::{self, Folder},
     played,
     scan::{self, Course},
     tell, watch,
@@ -51,7 +51,7 @@ const STEP: f64 = 0.03;
 const INSTANTS: usize = 6;
 
 /// Files that it writes.
-const FILES: [&str; 28] = [
+const FILES: [&str; 27] = [
     "paper.haptize",
     "sponge.csv",
     "sponge.haptize",
@@ -79,7 +79,6 @@ const FILES: [&str; 28] = [
     "scrape.svg",
     "scrape.png",
     "table.md",
-    "table.json",
 ];
 
 /// Where the figures go.
@@ -98,9 +97,10 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let started = Instant::now();
     let folder = &arguments.output;
-    let earlier = Folder::check(folder, FILES, [])?;
-    for log in FILES.iter().filter(|name| name.ends_with(".csv")).map(|name| folder.join(name)) {
-        if log.exists() && !ScanLog::is_simulated(&log) {
+    let (logs, made): (Vec<_>, Vec<_>) = FILES.into_iter().partition(|name| name.ends_with(".csv"));
+    let earlier = Folder::check(folder, made, [])?;
+    for log in logs.into_iter().map(|name| folder.join(name)).filter(|log| log.symlink_metadata().is_ok()) {
+        if output::replaceable(&log)?.is_some() && !ScanLog::is_simulated(&log) {
             let why = "is no log of a simulated scan, and is not replaced: move it away, or give another folder by -o";
             return Err(format!("{}: {why}", log.display()).into());
         }
@@ -144,13 +144,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let json = serde_json::json!({
         "comparison": comparison, "bake": sweep, "press": pressed.summary(), "scrape": scraped.summary()
     });
-    let tables = [("table.md", comparison.markdown()), ("table.json", format!("{:#}\n", json["comparison"]))];
-    for (name, text) in tables {
-        let file = folder.join(name);
-        replace_file(&file, |out| out.write_all(text.as_bytes()))
-            .map_err(|error| format!("cannot write {}: {error}", file.display()))?;
-        files.push(file);
-    }
+    let table = folder.join("table.md");
+    replace_file(&table, |out| out.write_all(comparison.markdown().as_bytes()))
+        .map_err(|error| format!("cannot write {}: {error}", table.display()))?;
+    files.push(table);
     let seconds = started.elapsed().as_secs_f64();
     let mut report = describe(&comparison, folder, seconds, json, &files)?;
     let data = FILES.iter().filter(|name| name.ends_with(".csv") || name.ends_with(".haptize"));

@@ -5,7 +5,7 @@ use super::{
     keyboard::Keyboard,
     motion,
     on_demand::{self, Explored, Exploring},
-    output::{self, Earlier, Folder, Kind as FileKind},
+    output::{self, Content, Earlier, Folder},
     playback_report::{Beside, PlaybackReport},
     played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, play_timed, traced, unwritten, write},
     shell, tell,
@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let setup = if exploring.is_some() { Setup::explored(&dataset) } else { Setup::new(&dataset) };
     let setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
-    let is_table = |file: &PathBuf| FileKind::of_log(file) != FileKind::Mcap;
+    let is_table = |file: &PathBuf| !output::is_mcap(file);
     let needs_solved_forces = setup.haptics.effects().is_some_and(ContactEffects::need_solved_forces);
     if needs_solved_forces && arguments.record.as_ref().is_some_and(is_table) {
         return Err("friction and contact damping act on demand by contact forces that no recording holds: leave out \
@@ -393,7 +393,7 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
             format!("{lost} ticks were not recorded, the machine is too busy: nothing is written; try again").into()
         );
     }
-    if FileKind::of_log(file) == FileKind::Mcap {
+    if output::is_mcap(file) {
         let mut facts = BTreeMap::from([
             ("haptize".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
             ("dataset".to_owned(), arguments.dataset.display().to_string()),
@@ -435,15 +435,12 @@ impl Outputs {
         let read = [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay);
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).chain([Path::new(&arguments.motion)]).collect();
         let filled = Folder::check(folder, FILES.into_iter().chain(report::FIGURES), inputs.clone())?;
-        let file = |file: Option<&PathBuf>, kind: fn(&Path) -> FileKind| {
-            let checked = file.map(|file| {
-                let earlier = output::check(file, kind(file), inputs.iter().copied())?;
-                filled.keep_apart(file).map(|()| earlier)
-            });
-            checked.transpose()
-        };
-        let recorded = file(arguments.record.as_ref(), FileKind::of_log)?;
-        let explored = file(arguments.on_demand.as_ref(), |_| FileKind::Dataset)?;
+        let read = inputs.iter().copied();
+        let recorded =
+            arguments.record.as_ref().map(|file| output::check(file, Content::Log, read.clone())).transpose()?;
+        let explored =
+            arguments.on_demand.as_ref().map(|file| output::check(file, Content::Dataset, read)).transpose()?;
+        arguments.record.iter().chain(&arguments.on_demand).try_for_each(|file| filled.keep_apart(file))?;
         Ok(Self { filled, recorded, explored })
     }
 }

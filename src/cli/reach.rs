@@ -1,20 +1,16 @@
 //! `haptize reach`: where contact is, before anything is baked, and the grid that follows.
 
-use super::{
-    Failure, Report, interrupt,
-    output::{self, Kind},
-    tell, watch,
-};
+use super::{Failure, Report, interrupt, output, tell, watch};
 use crate::{
     dataset::replace_file,
     scene::Scene,
-    sweep::{Aim, BackendChoice, Cost, JointReach, Pilot, PilotError, Reach, ReachError},
+    sweep::{Aim, BackendChoice, Cost, JointReach, Pilot, Reach},
 };
 use std::{
     fmt::{self, Write},
     io::Write as _,
     path::PathBuf,
-    sync::atomic::AtomicBool,
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 /// Arguments of `haptize reach`.
@@ -63,7 +59,7 @@ fn depth(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = Scene::load(&arguments.scene)?;
     if arguments.write {
-        output::check(&arguments.scene, Kind::Text, [])?;
+        output::replaceable(&arguments.scene)?;
         if !scene.grid.axes.is_empty() {
             let why = "has a [grid] already; delete that first, or leave out --write and copy what is printed";
             return Err(format!("{}: {why}", arguments.scene.display()).into());
@@ -78,7 +74,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     json["costs"] = serde_json::to_value(&costs)?;
     json["grid"] = grid.as_ref().ok().cloned().into();
     let mut text = String::new();
-    describe(&mut text, &reach, &costs, arguments)?;
+    describe(&mut text, &reach, arguments)?;
+    describe_costs(&mut text, &costs)?;
     let whole = grid.is_ok();
     match grid {
         Err(refusal) => {
@@ -128,7 +125,8 @@ pub fn complete(scene: Scene, backend: BackendChoice, chosen: bool) -> Result<Sc
 /// Result for a scene.
 struct Found {
     reach: Reach,
-    pilot: Pilot,
+    /// Absent where it was stopped.
+    pilot: Option<Pilot>,
     costs: Vec<Cost>,
     /// The table of the grid, or why there is none.
     grid: Result<String, String>,
@@ -136,17 +134,22 @@ struct Found {
 
 fn find(scene: &Scene, arguments: &Arguments, stop: &AtomicBool) -> Result<Found, Failure> {
     let reach = Reach::new(scene, arguments.depth, stop)?;
+    // What is known stands on the terminal, however the rest ends.
+    for JointReach { name, unit, range: [low, high], .. } in &reach.joints {
+        tell(format_args!("haptize: contact along {name}: {low:.4} to {high:.4} {unit}"));
+    }
     let based = reach.scene(scene)?;
-    tell(format_args!("haptize: coarse grids over the ranges against random configurations ..."));
+    tell(format_args!("haptize: coarse grids over these ranges against random configurations ..."));
     let pilot = match Pilot::run(&based, arguments.max_error, arguments.backend, stop) {
-        Err(PilotError::Bake(_)) if stop.load(std::sync::atomic::Ordering::Relaxed) => {
-            return Err(ReachError::Stopped.into());
+        Err(_) if stop.load(Ordering::Relaxed) => {
+            let grid = Err("stopped before its grids were tried: the ranges hold, a grid was not chosen".to_owned());
+            return Ok(Found { reach, pilot: None, costs: Vec::new(), grid });
         }
         pilot => pilot?,
     };
     let costs = ERRORS.iter().filter_map(|error| pilot.cost(&based, *error)).collect();
     let grid = grid(&reach, &pilot, &based, arguments.max_points);
-    Ok(Found { reach, pilot, costs, grid })
+    Ok(Found { reach, pilot: Some(pilot), costs, grid })
 }
 
 /// The table of a grid that keeps the pilot's aim, of at most `limit` points.
@@ -156,7 +159,7 @@ fn grid(reach: &Reach, pilot: &Pilot, based: &Scene, limit: usize) -> Result<Str
     Ok(reach.table(&pilot.spaced(based, cost.finer)))
 }
 
-fn describe(text: &mut String, reach: &Reach, costs: &[Cost], arguments: &Arguments) -> fmt::Result {
+fn describe(text: &mut String, reach: &Reach, arguments: &Arguments) -> fmt::Result {
     let Reach { configurations, contact, contact_in_ranges, volume, body, shallow, deepest, depths, joints } = reach;
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     writeln!(
@@ -188,6 +191,13 @@ fn describe(text: &mut String, reach: &Reach, costs: &[Cost], arguments: &Argume
         let ends = |[low, high]: &[f64; 2]| format!("{low:.3} to {high:.3} {unit}");
         let shares: Vec<_> = contact.iter().map(|share| format!("{:>3.0}", 100.0 * share)).collect();
         writeln!(text, "{name:<14} {:<23} {:<23} {}", ends(range), ends(limits), shares.join(" "))?;
+    }
+    Ok(())
+}
+
+fn describe_costs(text: &mut String, costs: &[Cost]) -> fmt::Result {
+    if costs.is_empty() {
+        return Ok(());
     }
     writeln!(text, "\nrms error      points        solving from rest   file")?;
     for Cost { relative, points, seconds, bytes, is_known, .. } in costs {

@@ -38,6 +38,7 @@ pub struct RefinementGoal<'a> {
 pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
     let began = Instant::now();
     check_algorithm(scene)?;
+    let aim = wanted.aim.checked(scene)?;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
@@ -46,10 +47,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
     let mut judges = [seen, Judge::new(scene, &model, 2, JUDGED)?];
-    let aim = match wanted.aim {
-        Aim::Relative(share) => share,
-        Aim::Absolute(torque) => torque / judges[0].torque(),
-    };
+    let aim = aim.relative(judges[0].torque());
     let mut refine =
         Refine { model: &model, base: grid_of(scene), levels: wanted.levels, aim, most: wanted.most, batch: 1 };
     let most = uniform(&refine).min(refine.most);

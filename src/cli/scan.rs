@@ -5,7 +5,7 @@ use super::{
     bar::Bar,
     interrupt,
     keyboard::Keyboard,
-    output::{self, Kind},
+    output::{self, Content},
     shell, tell,
 };
 use crate::{
@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file; give -o")?)
             .with_extension("csv"),
     };
-    output::check(&output, Kind::Table, [arguments.scene.as_path()])?;
+    output::check(&output, Content::Log, [arguments.scene.as_path()])?;
     let stop = if arguments.device.is_some() { interrupt::stop_flag_of_device() } else { interrupt::stop_flag() };
     let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
     let mut progress = |progress: ScanProgress| {
@@ -109,8 +109,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
 
 /// Writes the plan of `scene` to `file`.
 fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<Report, Failure> {
-    let kind = Kind::of_log(file);
-    let earlier = output::check(file, kind, [arguments.scene.as_path()])?;
+    let content = if output::is_mcap(file) { Content::Log } else { Content::Product };
+    let earlier = output::check(file, content, [arguments.scene.as_path()])?;
     let control = &scene.scan.control;
     let dwell = arguments.dwell.unwrap_or(control.window + control.average);
     if !(dwell > 0.0 && dwell <= LONGEST) {
@@ -120,9 +120,9 @@ fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<R
     let plan = Plan::new(&scene.scan.plan, &chain)?;
     let trajectory = Trajectory::new(&plan, control.speed, dwell);
     let joints = labels(&chain);
-    let written = replace_file(file, |out| match kind {
-        Kind::Mcap => trajectory.write_mcap(&joints, out),
-        _ => trajectory.write_csv(&joints, out),
+    let written = replace_file(file, |out| match output::is_mcap(file) {
+        true => trajectory.write_mcap(&joints, out),
+        false => trajectory.write_csv(&joints, out),
     });
     written
         .map_err(|error| format!("cannot write {}: {error}; free some space or give another place", file.display()))?;

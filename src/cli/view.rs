@@ -63,7 +63,7 @@ fn size(text: &str) -> Result<[f32; 2], String> {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     use super::{
         interrupt,
-        output::{self, Kind},
+        output::{self, Content},
     };
     use crate::viewer::{self, DeviceChoice, Picture, Start};
     let device = arguments.device.clone().map(|address| {
@@ -83,7 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(format!("{}: the picture is a PNG file: give a name that ends in .png", file.display()).into());
     }
-    let earlier = output::check(file, Kind::Picture, arguments.file.as_deref())?;
+    let earlier = output::check(file, Content::Product, arguments.file.as_deref())?;
     if !(0.0..=60.0).contains(&arguments.time) {
         return Err(format!("cannot play {} s: give --time from 0 to 60", arguments.time).into());
     }
@@ -118,10 +118,10 @@ fn explore(
 ) -> Result<Report, Failure> {
     use super::{
         interrupt,
-        output::{self, Kind},
+        output::{self, Content},
     };
     use crate::viewer::{self, Start};
-    let earlier = output::check(kept, Kind::Dataset, Some(scene))?;
+    let earlier = output::check(kept, Content::Dataset, Some(scene))?;
     let exploring = choices.open(scene, kept)?;
     // The program ends soon after a signal, as by any.
     exploring.keep(Some(interrupt::stop_flag()), || {

@@ -1,22 +1,22 @@
 //! The error of a dataset, as its bake measured it.
 
-use crate::names::escaped;
+use crate::{names::escaped, scene::NormUnit};
 use serde::{Deserialize, Serialize};
 
 /// Errors of the torque at random configurations, against the lowest equilibrium that is found there directly: in the
-/// cells of a uniform grid that have a corner in contact, or anywhere in the range of a store. Torques are Euclidean
-/// norms over the joints, in which the forces of sliding joints count with an arm.
+/// cells of a uniform grid that have a corner in contact, or anywhere in the range of a store. Torques are
+/// [norms](crate::scene::EffortNorm) over the joints.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredError {
     /// Random configurations, solved directly.
     pub configurations: usize,
     /// Configurations left out, because the direct solution did not converge.
     pub left_out: usize,
-    /// Rms of the torque at the configurations (N m).
+    /// Rms of the torque at the configurations (`unit`).
     pub torque: f64,
-    /// Arm with which the forces of sliding joints count (m); absent where no joint slides.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lever_arm: Option<f64>,
+    /// What this torque and the errors are measured in.
+    #[serde(flatten)]
+    pub unit: NormUnit,
     /// Interpolation by which the dataset answers as its scene has it felt, one of those in `errors`.
     pub interpolation: String,
     /// Errors of each interpolation.
@@ -29,7 +29,7 @@ pub struct MeasuredError {
 /// Difference of contact with the surface at rest from contact with the deformed surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GeometryError {
-    /// Root mean square of the torques' difference (N m).
+    /// Root mean square of the torques' difference (unit of the torque).
     pub rms: f64,
     /// Greatest depth of a node below the surface at rest (m).
     pub depth: f64,
@@ -44,11 +44,11 @@ const TELLING_GEOMETRY: f64 = 0.05;
 pub struct InterpolationError {
     /// Name of the interpolation, as in the scene.
     pub interpolation: String,
-    /// Median (N m).
+    /// Median (unit of the torque).
     pub median: f64,
-    /// Root mean square (N m).
+    /// Root mean square (unit of the torque).
     pub rms: f64,
-    /// Greatest (N m).
+    /// Greatest (unit of the torque).
     pub worst: f64,
 }
 
@@ -128,7 +128,7 @@ mod tests {
         let measured = MeasuredError {
             configurations: 3,
             torque: 10.0,
-            lever_arm: None,
+            unit: NormUnit::default(),
             interpolation: "potential".into(),
             errors: vec![error, other],
             left_out: 0,

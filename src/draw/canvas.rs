@@ -196,7 +196,7 @@ impl Canvas {
             concat!(
                 r#"<svg xmlns="http://www.w3.org/2000/svg" width="{w}" height="{h}" viewBox="0 0 {w} {h}" "#,
                 r#"font-family="{family}, sans-serif" style="font-kerning:none">"#,
-                "\n",
+                "\n<!-- haptize -->\n",
                 r#"<rect width="100%" height="100%" fill="{white}"/>"#,
                 "\n<style>{style}</style>\n"
             ),
@@ -416,6 +416,7 @@ pub(crate) fn encode_png(
     encoder.set_color(channels);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
+    encoder.add_text_chunk("Software".into(), "haptize".into())?;
     let mut writer = encoder.write_header()?;
     writer.write_image_data(pixels)?;
     writer.finish()

@@ -54,6 +54,9 @@ const MAX_FRAMES: u32 = 10_000;
 /// Beginning of the comment with the first position.
 const START: &str = "# start";
 
+/// Beginning of the file.
+pub const SIGNATURE: &str = "# a session of haptize";
+
 /// Beginning of the comment with the frames' instants.
 const KEPT: &str = "# frames";
 
@@ -64,7 +67,7 @@ impl Recording {
     /// Those of `out`.
     pub fn write(trace: &Trace, out: &mut impl Write) -> io::Result<()> {
         let joints = trace.joints.len();
-        writeln!(out, "# a session of haptize {}; `haptize play --replay` gives it again", env!("CARGO_PKG_VERSION"))?;
+        writeln!(out, "{SIGNATURE} {}; `haptize play --replay` gives it again", env!("CARGO_PKG_VERSION"))?;
         let mut table = Table::new(out);
         write_vector(&trace.start, joints, table.field(START)?)?;
         table.end()?;

@@ -17,7 +17,7 @@ use crate::{
     field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, ProxyInertia, Rendering, SceneError, THRESHOLD, lever},
+    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError, THRESHOLD},
 };
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -183,7 +183,9 @@ pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<
     if dataset.scene.trim().is_empty() {
         let mut slopes = JointVector::zeros(dataset.grid.joints());
         let axes = slopes.iter_mut().zip(&dataset.grid.axes);
-        axes.for_each(|(slope, axis)| *slope = BOUNDARY_SLOPE / lever(&axis.unit).powi(2));
+        axes.for_each(|(slope, axis)| {
+            *slope = if axis.unit == "m" { BOUNDARY_SLOPE / (LEVER_ARM * LEVER_ARM) } else { BOUNDARY_SLOPE };
+        });
         (scene, threshold, slope) = (Interpolation::Linear, THRESHOLD, slopes);
     } else {
         let haptics = Rendering::parse(&dataset.scene, "scene")?.haptics;

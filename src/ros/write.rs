@@ -31,7 +31,7 @@ impl<W: Write> JointStateWriter<W> {
     /// # Errors
     /// Those of `out`.
     pub fn new(out: W) -> io::Result<Self> {
-        let options = WriteOptions::new().compression(None).profile("ros2").disable_seeking(true);
+        let options = WriteOptions::new().compression(None).profile("ros2").library("haptize").disable_seeking(true);
         let mut writer = options.create(NoSeek::new(out)).map_err(failed)?;
         let schema = writer.add_schema(TYPE, SCHEMA_ENCODING, SCHEMA.as_bytes()).map_err(failed)?;
         Ok(Self { writer, schema, sequence: 0 })

@@ -1,6 +1,9 @@
 //! What acts along joints, in words: a torque where a joint turns, a force where it slides.
 
-use super::LEVER_ARM;
+use super::{LEVER_ARM, Scene};
+use crate::JointVector;
+use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Returns the unit of what acts along a coordinate in `unit`: a torque, or a force where that is a length.
 #[must_use]
@@ -29,24 +32,79 @@ pub fn effort_norms<'a>([torque, force]: [f64; 2], units: impl IntoIterator<Item
     }
 }
 
-/// The factor of the torque of a joint with coordinates in `unit` in a norm over joints: [`LEVER_ARM`] for the force of
-/// a sliding one (m), else 1.
-#[must_use]
-pub fn lever(unit: &str) -> f64 {
-    if unit == "m" { LEVER_ARM } else { 1.0 }
+/// The Euclidean norm over joints of what acts along them, of a difference of torques for example.
+///
+/// Where all joints slide it is a norm of forces (N). Else it is one of torques (N m), in which the force of a joint that
+/// slides counts with an arm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EffortNorm {
+    factors: JointVector,
+    /// What its values are measured in.
+    pub unit: NormUnit,
 }
 
-/// The arm with which the forces of sliding joints count in a norm of torques over joints with coordinates in `units`
-/// (m); absent where no joint slides.
-#[must_use]
-pub fn lever_arm<'a>(units: impl IntoIterator<Item = &'a str>) -> Option<f64> {
-    units.into_iter().any(|unit| unit == "m").then_some(LEVER_ARM)
+impl EffortNorm {
+    /// The norm over joints with coordinates in `units`.
+    #[must_use]
+    pub fn new<'a>(units: impl IntoIterator<Item = &'a str>) -> Self {
+        let slides: Vec<bool> = units.into_iter().map(|unit| unit == "m").collect();
+        let (forces, mixed) = (slides.iter().all(|slides| *slides), slides.contains(&true));
+        let lever_arm = (mixed && !forces).then_some(LEVER_ARM);
+        let factors: Vec<f64> = slides.iter().map(|slides| lever_arm.filter(|_| *slides).unwrap_or(1.0)).collect();
+        Self { factors: JointVector::from_slice(&factors), unit: NormUnit { forces, lever_arm } }
+    }
+
+    /// The norm over the joints of the arm of `scene`.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        Self::new(scene.proxy.joints.iter().map(|joint| joint.kind.unit()))
+    }
+
+    /// How many joints there are.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.factors.len()
+    }
+
+    /// Squared distance of two vectors of torques and forces (N^2 m^2, or N^2).
+    #[must_use]
+    pub fn square(&self, a: &JointVector, b: &JointVector) -> f64 {
+        let parts = a.iter().zip(b.iter()).zip(self.factors.iter());
+        parts.map(|((a, b), factor)| (factor * (a - b)).powi(2)).sum()
+    }
 }
 
-/// Says after a norm of torques with which arm the forces of sliding joints count in it, if there are such joints.
-#[must_use]
-pub fn arm_note(lever_arm: Option<f64>) -> String {
-    lever_arm.map_or(String::new(), |arm| format!(" (forces of sliding joints times {arm} m)"))
+/// What the values of an [`EffortNorm`] are measured in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NormUnit {
+    /// Whether they are forces (N), since all joints slide, and not torques (N m).
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub forces: bool,
+    /// Arm with which the forces of sliding joints count in a norm of torques (m); absent where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lever_arm: Option<f64>,
+}
+
+/// Whether a flag is left out of a file.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_false(flag: &bool) -> bool {
+    !*flag
+}
+
+impl NormUnit {
+    /// The unit alone.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        if self.forces { "N" } else { "N m" }
+    }
+}
+
+/// The unit, and with which arm the forces of sliding joints count, if there are such joints.
+impl fmt::Display for NormUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())?;
+        self.lever_arm.map_or(Ok(()), |arm| write!(f, " (forces of sliding joints times {arm} m)"))
+    }
 }
 
 #[cfg(test)]
@@ -60,7 +118,27 @@ mod tests {
         assert_eq!(norms(&["rad", "rad"]), "1.0000 N m");
         assert_eq!(norms(&["m"]), "2.0000 N");
         assert_eq!(norms(&["rad", "m"]), "1.0000 N m and 2.0000 N");
-        assert_eq!(lever_arm(["rad"]), None);
-        assert_eq!(arm_note(lever_arm(["rad", "m"])), " (forces of sliding joints times 0.1 m)");
+    }
+
+    #[test]
+    fn a_norm_is_one_of_forces_where_all_joints_slide() {
+        let zero = JointVector::from_slice(&[0.0, 0.0]);
+        let of = |units: [&str; 2]| {
+            let norm = EffortNorm::new(units);
+            (norm.square(&JointVector::from_slice(&[3.0, 4.0]), &zero), norm.unit.to_string())
+        };
+        assert_eq!(of(["rad", "rad"]), (25.0, "N m".into()));
+        assert_eq!(of(["m", "m"]), (25.0, "N".into()));
+        let (square, unit) = of(["rad", "m"]);
+        assert!((square - 9.16).abs() < 1e-12, "{square}");
+        assert_eq!(unit, "N m (forces of sliding joints times 0.1 m)");
+    }
+
+    #[test]
+    fn files_from_before_forces_had_a_norm_keep_their_unit() {
+        let read = |text: &str| serde_json::from_str::<NormUnit>(text).unwrap().to_string();
+        assert_eq!(read("{}"), "N m");
+        assert_eq!(read(r#"{"lever_arm":0.1}"#), "N m (forces of sliding joints times 0.1 m)");
+        assert_eq!(read(r#"{"forces":true}"#), "N");
     }
 }

@@ -28,7 +28,7 @@ mod value;
 pub use contact::{Algorithm, ContactGeometry, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
-pub use effort::{arm_note, effort_norms, effort_unit, efforts, lever, lever_arm};
+pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
 pub use error::{Diagnostic, SceneError};
 pub use gains::GainError;
 pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};

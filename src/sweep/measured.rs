@@ -13,7 +13,7 @@
 
 use super::{
     lowest,
-    reference::{Reference, TorqueNorm},
+    reference::Reference,
     table::{PointResult, Table},
     thin_parts,
 };
@@ -23,7 +23,7 @@ use crate::{
     dataset::{Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
-    scene::{Algorithm, ContactSpec, Interpolation},
+    scene::{Algorithm, ContactSpec, EffortNorm, Interpolation},
 };
 use rayon::prelude::*;
 use std::{
@@ -120,7 +120,7 @@ impl ErrorCheck<'_> {
         let Some(solved) = solved.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
         let kept: Vec<&Place> =
             places.iter().zip(&solved).filter(|(_, found)| !found.status.is_failed()).map(|(place, _)| place).collect();
-        let norm = TorqueNorm::new(grid.axes.iter().map(|axis| axis.unit.as_str()));
+        let norm = EffortNorm::new(grid.axes.iter().map(|axis| axis.unit.as_str()));
         let reference = Reference::of(norm, places.iter().map(|place| place.q).zip(solved));
         let errors = Interpolation::ALL.into_par_iter().map(|interpolation| {
             let of = (interpolation, self.threshold, &self.slope);

@@ -55,7 +55,7 @@ pub use lowest::Lowered;
 pub use measured::MOST_CONFIGURATIONS;
 pub use merge::{Merge, MergeError, Merged};
 pub use node::{NoEnergy, check_algorithm};
-pub use pilot::{Aim, Choice, Cost, Pilot, PilotError, Prospect, Trial};
+pub use pilot::{Aim, AimError, Choice, Cost, Pilot, PilotError, Prospect, Trial};
 pub use plan::{Plan, ShardCost};
 pub use reach::{DepthShare, JointReach, Reach, ReachError};
 pub use reference::{REFERENCE_TOLERANCE, ReferenceError};

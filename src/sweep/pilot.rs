@@ -20,7 +20,7 @@ use crate::{
     field::{FieldError, TorqueField},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{ContactSpec, Interpolation, Scene, SceneError, arm_note},
+    scene::{ContactSpec, EffortNorm, Interpolation, NormUnit, Scene, SceneError},
 };
 use serde::Serialize;
 use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
@@ -57,8 +57,39 @@ const TOLERANCES: [f64; 6] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 pub enum Aim {
     /// Relative to the rms of the torque over the grid's region (1).
     Relative(f64),
-    /// (N m)
-    Absolute(f64),
+    /// In the unit of the norm of the arm's torque: a torque (N m), or, where all its joints slide, a force (N).
+    Absolute(f64, &'static str),
+}
+
+/// An error was given in a unit that the norm of the arm's torque does not have.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("an error in {given} was asked for, but that of this arm is measured in {norm}: give it in {}", norm.name())]
+pub struct AimError {
+    given: &'static str,
+    norm: NormUnit,
+}
+
+impl Aim {
+    /// The same, if it has the unit of the norm of the torque of the arm of `scene`.
+    ///
+    /// # Errors
+    /// Where it has another.
+    pub fn checked(self, scene: &Scene) -> Result<Self, AimError> {
+        let unit = EffortNorm::of(scene).unit;
+        match self {
+            Self::Absolute(_, given) if given != unit.name() => Err(AimError { given, norm: unit }),
+            _ => Ok(self),
+        }
+    }
+
+    /// The error to stay below over the rms `torque` (1).
+    #[must_use]
+    pub fn relative(self, torque: f64) -> f64 {
+        match self {
+            Self::Relative(share) => share,
+            Self::Absolute(aim, _) => aim / torque,
+        }
+    }
 }
 
 impl FromStr for Aim {
@@ -66,17 +97,20 @@ impl FromStr for Aim {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |digits: &str| digits.trim().parse::<f64>().ok().filter(|aim| aim.is_finite() && *aim > 0.0);
-        let absolute = ["N m", "Nm", "N*m"].iter().find_map(|unit| text.trim().strip_suffix(unit));
+        let units = [("N m", "N m"), ("Nm", "N m"), ("N*m", "N m"), ("N", "N")];
+        let absolute = units.iter().find_map(|(end, unit)| Some((text.trim().strip_suffix(end)?, *unit)));
         let percent = text.trim().strip_suffix('%');
         let aim = match (absolute, percent) {
-            (Some(digits), _) => number(digits).map(Self::Absolute),
+            (Some((digits, unit)), _) => number(digits).map(|aim| Self::Absolute(aim, unit)),
             (None, Some(digits)) => {
                 number(digits).map(|percent| percent / 100.0).filter(|aim| *aim < 1.0).map(Self::Relative)
             }
             (None, None) => number(text).filter(|aim| *aim < 1.0).map(Self::Relative),
         };
         aim.ok_or_else(|| {
-            "give a fraction of the rms torque below 1, such as 0.01 or 1%, or a torque, such as \"0.002 N m\"".into()
+            "give a fraction of the rms torque below 1, such as 0.01 or 1%, or a torque, such as \"0.002 N m\", or, for \
+             an arm whose joints all slide, a force, such as \"0.02 N\""
+                .into()
         })
     }
 }
@@ -90,9 +124,9 @@ pub struct Trial {
     pub spacing: f64,
     /// Grid points.
     pub points: usize,
-    /// Rms error (N m).
+    /// Rms error (the pilot's unit).
     pub rms: f64,
-    /// Worst error (N m).
+    /// Worst error (the pilot's unit).
     pub worst: f64,
 }
 
@@ -112,15 +146,15 @@ pub struct Prospect {
 /// Result of a pilot.
 #[derive(Clone, Debug, Serialize)]
 pub struct Pilot {
-    /// Rms error to stay below (N m).
+    /// Rms error to stay below (`unit`).
     pub aim: f64,
     /// The same over the rms torque (1).
     pub relative: f64,
-    /// Rms of the torque (N m).
+    /// Rms of the torque (`unit`).
     pub torque: f64,
-    /// As in [`MeasuredError`](crate::dataset::MeasuredError::lever_arm) (m).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lever_arm: Option<f64>,
+    /// What torques and errors are measured in.
+    #[serde(flatten)]
+    pub unit: NormUnit,
     /// Random configurations, and those in contact.
     pub configurations: usize,
     /// See `configurations`.
@@ -184,6 +218,9 @@ pub enum PilotError {
     /// Nothing to compare with.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// The error that was asked for has another unit.
+    #[error(transparent)]
+    Aim(#[from] AimError),
     /// A coarse grid cannot be baked.
     #[error(transparent)]
     Bake(#[from] BakeError),
@@ -221,6 +258,7 @@ impl Pilot {
     /// Any [`PilotError`] but [`PilotError::OutOfReach`].
     pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, PilotError> {
         check_given(scene).map_err(BakeError::from)?;
+        let aim = aim.checked(scene)?;
         let ground = Ground::new(scene)?;
         let model = ground.model(scene)?;
         let reference = Reference::in_contact(scene, &model, SEED, CONTACTS)?;
@@ -249,15 +287,13 @@ impl Pilot {
             }
         }
         let torque = reference.torque;
-        let aim = match aim {
-            Aim::Relative(share) => share * torque,
-            Aim::Absolute(aim) => aim,
-        };
+        let relative = aim.relative(torque);
+        let aim = relative * torque;
         Ok(Self {
             aim,
-            relative: aim / torque,
+            relative,
             torque,
-            lever_arm: reference.norm.lever_arm,
+            unit: reference.norm.unit,
             configurations: reference.exact.len(),
             in_contact: reference.in_contact,
             prospects: prospects(&trials, SPACING_SHARE * aim, joints),
@@ -323,8 +359,8 @@ impl Pilot {
 
     /// Why no grid of at most `limit` points was chosen, of which `best` needs the fewest, and what to do.
     fn refused(&self, best: Option<&Prospect>, limit: usize) -> String {
-        let arm = arm_note(self.lever_arm);
-        let aim = format!("an rms error of {:.2e} N m{arm}, {} % of the rms torque", self.aim, percent(self.relative));
+        let (share, unit) = (percent(self.relative), self.unit);
+        let aim = format!("an rms error of {:.2e} {unit}, {share} % of the rms torque", self.aim);
         let Some(finest) = self.trials.first() else { return format!("{aim}, is out of reach: no grid was tried") };
         let tried = self.trials.iter().filter(|trial| trial.points == finest.points);
         let tried = tried.min_by(|a, b| a.rms.total_cmp(&b.rms)).unwrap_or(finest);

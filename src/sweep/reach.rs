@@ -8,7 +8,7 @@
 use super::{BakeError, build_object, spacing};
 use crate::{
     JointVector,
-    contact::{Model, Proximity},
+    contact::{Model, NodeTree},
     object::Object,
     proxy::Chain,
     random::Random,
@@ -138,7 +138,7 @@ pub enum ReachError {
 #[derive(Clone, Copy)]
 struct Met {
     q: JointVector,
-    /// Signed distance between proxy and surface (m).
+    /// Signed distance between proxy and surface where they touch, else zero (m).
     gap: f64,
 }
 
@@ -153,7 +153,7 @@ impl Reach {
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
         let model = Model::reaching(&object, &chain, scene.contact, &[]).map_err(BakeError::from)?;
-        let body = size(&object);
+        let (tree, body) = (NodeTree::new(&chain), size(&object));
         let shallow = depth.unwrap_or(SHALLOW * body);
         let is_shallow = |met: &Met| met.gap < 0.0 && -met.gap <= shallow;
         let mut random = Random::new(SEED);
@@ -162,7 +162,7 @@ impl Reach {
             if stop.load(Ordering::Relaxed) {
                 return Err(ReachError::Stopped);
             }
-            met.extend(measured(&model, scene, &mut random));
+            met.extend(measured(&model, &tree, scene, &mut random));
             if met.iter().filter(|met| is_shallow(met)).count() >= CONTACTS {
                 break;
             }
@@ -260,7 +260,7 @@ fn size(object: &Object) -> f64 {
 }
 
 /// A round of random configurations within the joint limits.
-fn measured(model: &Model<'_>, scene: &Scene, random: &mut Random) -> Vec<Met> {
+fn measured(model: &Model<'_>, tree: &NodeTree, scene: &Scene, random: &mut Random) -> Vec<Met> {
     let joints = &scene.proxy.joints;
     let place = |_| {
         let mut q = JointVector::zeros(joints.len());
@@ -268,7 +268,7 @@ fn measured(model: &Model<'_>, scene: &Scene, random: &mut Random) -> Vec<Met> {
         q
     };
     let drawn: Vec<JointVector> = (0..ROUND).map(place).collect();
-    drawn.into_par_iter().map_init(|| Proximity::new(model), |proximity, q| Met { gap: proximity.gap(&q), q }).collect()
+    drawn.into_par_iter().map(|q| Met { gap: tree.touching_gap(model, &q), q }).collect()
 }
 
 /// Contact along one joint; the `wanted` ones set its range.

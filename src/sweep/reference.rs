@@ -6,7 +6,7 @@ use crate::{
     contact::{Equilibrium, Model, Status},
     dataset::{InterpolationError, MeasuredError},
     random::Random,
-    scene::{Algorithm, ContactSpec, Interpolation, Scene, lever, lever_arm},
+    scene::{Algorithm, ContactSpec, EffortNorm, Interpolation, Scene},
 };
 
 /// Relative residual to which the reference of an accuracy study is solved (1): three decades below the scenes' own
@@ -16,28 +16,6 @@ pub const REFERENCE_TOLERANCE: f64 = 1e-11;
 /// Most configurations that are drawn to find some in contact: a region in contact at a few in a thousand is still
 /// seen.
 const MOST_DRAWN: usize = 1 << 16;
-
-/// The norm of torques over the joints, forces of sliding joints times their lever arm.
-#[derive(Clone, Copy)]
-pub(crate) struct TorqueNorm {
-    levers: JointVector,
-    /// As in [`MeasuredError::lever_arm`] (m).
-    pub lever_arm: Option<f64>,
-}
-
-impl TorqueNorm {
-    /// The norm over joints with coordinates in `units`.
-    pub fn new<'a>(units: impl Iterator<Item = &'a str> + Clone) -> Self {
-        let levers: Vec<f64> = units.clone().map(lever).collect();
-        Self { levers: JointVector::from_slice(&levers), lever_arm: lever_arm(units) }
-    }
-
-    /// Squared distance of two torques (N^2 m^2).
-    pub fn square(&self, a: &JointVector, b: &JointVector) -> f64 {
-        let parts = a.iter().zip(b.iter()).zip(self.levers.iter());
-        parts.map(|((a, b), lever)| (lever * (a - b)).powi(2)).sum()
-    }
-}
 
 /// Configurations and their torques, each solved once.
 pub(crate) struct Reference {
@@ -51,9 +29,9 @@ pub(crate) struct Reference {
     pub left_out: usize,
     /// Forces on the object's nodes, of all configurations.
     forces: usize,
-    /// rms of the torque (N m).
+    /// rms of the torque (the norm's unit).
     pub torque: f64,
-    pub norm: TorqueNorm,
+    pub norm: EffortNorm,
 }
 
 /// There is nothing to compare with.
@@ -73,7 +51,7 @@ pub enum ReferenceError {
 
 impl Reference {
     /// What was `solved`; configurations that did not converge are left out.
-    pub fn of(norm: TorqueNorm, solved: impl IntoIterator<Item = (JointVector, Equilibrium)>) -> Self {
+    pub fn of(norm: EffortNorm, solved: impl IntoIterator<Item = (JointVector, Equilibrium)>) -> Self {
         let (places, exact, energies) = (Vec::new(), Vec::new(), Vec::new());
         let mut reference = Self { places, exact, energies, in_contact: 0, left_out: 0, forces: 0, torque: 0.0, norm };
         reference.extend(solved);
@@ -97,7 +75,7 @@ impl Reference {
 
     /// Takes the rms of the torque anew.
     fn settle(&mut self) {
-        let zero = JointVector::zeros(self.norm.levers.len());
+        let zero = JointVector::zeros(self.norm.joints());
         self.torque = self.errors(|_| zero).0;
     }
 
@@ -122,7 +100,7 @@ impl Reference {
         let model = model.with_contact(tight(scene.contact, REFERENCE_TOLERANCE));
         let mut backend = CpuBackend::new(&model, 0).map_err(BackendError::from)?;
         let mut random = Random::new(seed);
-        let mut reference = Self::of(TorqueNorm::new(scene.proxy.joints.iter().map(|joint| joint.kind.unit())), []);
+        let mut reference = Self::of(EffortNorm::of(scene), []);
         let mut place = |_| {
             let mut q = JointVector::zeros(scene.grid.axes.len());
             for (q, axis) in q.iter_mut().zip(&scene.grid.axes) {
@@ -189,7 +167,7 @@ impl Reference {
             configurations: self.places.len(),
             left_out: self.left_out,
             torque: self.torque,
-            lever_arm: self.norm.lever_arm,
+            unit: self.norm.unit,
             interpolation: interpolation.name().to_owned(),
             errors,
             geometry: None,

@@ -26,7 +26,6 @@ const SHARED_NAMES: &[&str] = &[
     "Joint",
     "Kernel",
     "Keyboard",
-    "Kind",
     "Links",
     "Motion",
     "Picture",

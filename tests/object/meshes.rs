@@ -156,6 +156,9 @@ fn an_stl_file_is_read_whole_however_its_program_writes_it() {
         (text.replacen("vertex", "color", 1).into_bytes(), "line 4: one of the words"),
         (text.replacen("    endloop", "vertex 1 2 3", 1).into_bytes(), "line 8: a facet has three vertices"),
         (text.replacen("vertex -1", "vertex -1,5", 1).into_bytes(), "line 4: a vertex has three coordinates"),
+        ([text.as_bytes(), &[0; 512]].concat(), "line 87: it holds bytes of zero"),
+        ([text.as_bytes(), binary].concat(), "line 87: it holds bytes of zero"),
+        (text.replacen("vertex -1", "vertex \0-1", 1).into_bytes(), "line 4: it holds bytes of zero"),
         (b"<html>".to_vec(), "line 1: a solid begins with `solid`"),
     ] {
         let error = build_from("stl", &content).unwrap_err().to_string();

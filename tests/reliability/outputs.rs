@@ -119,7 +119,7 @@ fn nothing_is_written_to_devices_and_pipes() {
     }
     std::fs::create_dir(home.path().join("o")).unwrap();
     for name in
-        ["cspace.png", "gridized.svg", "accuracy.csv", "table.json", "sponge.csv", "out.contacts.csv", "haptize.1"]
+        ["cspace.png", "gridized.svg", "accuracy.csv", "table.md", "sponge.csv", "out.contacts.csv", "haptize.1"]
     {
         irregular(&home.path().join("o"), name);
     }
@@ -149,7 +149,7 @@ fn nothing_is_written_to_devices_and_pipes() {
         kind.is_char_device() || kind.is_fifo()
     };
     assert!(
-        ["device", "device.png", "o/cspace.png", "o/table.json"].iter().all(|name| irregular(&home.path().join(name)))
+        ["device", "device.png", "o/cspace.png", "o/table.md"].iter().all(|name| irregular(&home.path().join(name)))
     );
     assert_eq!(names(&home.path().join("o")).len(), 7);
 }
@@ -177,7 +177,7 @@ fn a_folder_holds_the_files_of_one_run_and_it_is_told_what_was_replaced() {
     let mut left = files(&offline);
     left.insert("notes.txt".into());
     assert_eq!(names(&home.path().join("o")), left);
-    refused(home.path(), &["play", "x.haptize", "--record", "o/../o/trace.csv", "-o", "o"], "into the folder, too");
+    refused(home.path(), &["play", "x.haptize", "--record", "o/../o/trace.csv", "-o", "o"], "is not a log of haptize");
     refused(home.path(), &["play", "x.haptize", "--record", "new/motion.svg", "-o", "new"], "cannot be written");
     for again in [
         &["man", "-o", "m"][..],
@@ -199,7 +199,7 @@ fn an_export_writes_over_no_dataset_of_its_second_name_and_leaves_no_stale_one()
     let path = |name: &str| home.path().join(name);
     std::fs::copy(path("x.haptize"), path("y.contacts.csv")).unwrap();
     refused(home.path(), &["export", "y.contacts.csv", "--format", "csv", "-o", "y.csv"], "also an input");
-    refused(home.path(), &["export", "x.haptize", "--format", "csv", "-o", "y.csv"], "not a table");
+    refused(home.path(), &["export", "x.haptize", "--format", "csv", "-o", "y.csv"], "not a table or figure");
     // Once with contact forces, once without.
     succeed(home.path(), &["export", "x.haptize", "--format", "csv", "-o", "z.csv"]);
     assert!(path("z.contacts.csv").exists());

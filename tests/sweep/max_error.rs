@@ -20,6 +20,23 @@ fn text() -> String {
         .replace("count = 3 }]", "count = 3, radius = 0.01 }]")
 }
 
+/// A ball on one slide above the sphere.
+const SLIDE: &str = r#"
+[object]
+sphere = { radius = 0.05, rings = 9, segments = 10 }
+springs = { kind = "isotropic", stiffness = 300.0 }
+ground = { stiffness = 100.0 }
+[contact]
+stiffness = 500.0
+[grid]
+axes = [{ start = -0.01, stop = 0.01, count = 21 }]
+[[proxy.joint]]
+kind = "prismatic"
+axis = [0.0, 0.0, -1.0]
+limits = [-0.02, 0.02]
+nodes = [{ at = [0.0, 0.0, 0.06], radius = 0.01 }]
+"#;
+
 fn haptize(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
     command.current_dir(folder).args(arguments).output().unwrap()
@@ -98,7 +115,7 @@ fn an_error_that_no_grid_keeps_is_refused_before_anything_is_written() {
         assert_eq!(std::fs::read(folder.output()).unwrap(), earlier);
         assert_eq!(folder.names(), ["a.haptize", "a.toml"]);
     }
-    for wrong in ["0", "-0.1", "1.5", "150%", "%", "N m", "0.1 N", "nan"] {
+    for wrong in ["0", "-0.1", "1.5", "150%", "%", "N m", "N", "nan"] {
         let output = haptize(folder.0.path(), &["bake", "a.toml", &format!("--max-error={wrong}")]);
         assert_eq!(output.status.code(), Some(2), "{wrong}");
         assert!(String::from_utf8_lossy(&output.stderr).contains("0.002 N m"), "{wrong}");
@@ -106,7 +123,27 @@ fn an_error_that_no_grid_keeps_is_refused_before_anything_is_written() {
     for text in ["0.05", "5%", "5 %"] {
         assert_eq!(text.parse(), Ok(Aim::Relative(0.05)));
     }
-    assert_eq!("0.002 N m".parse(), Ok(Aim::Absolute(0.002)));
+    assert_eq!("0.002 N m".parse(), Ok(Aim::Absolute(0.002, "N m")));
+    assert_eq!("0.02 N".parse(), Ok(Aim::Absolute(0.02, "N")));
+    for refined in [&[][..], &["--refine", "1"]] {
+        let output = haptize(folder.0.path(), &[&["bake", "a.toml", "--max-error=0.1 N"], refined].concat());
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && told.contains("give it in N m"), "{told}");
+    }
+}
+
+/// A ball on one slide presses into a sphere: its torque is a force, and so are its errors.
+#[test]
+fn an_arm_of_slides_alone_errs_by_newtons() {
+    let folder = Folder::new();
+    std::fs::write(folder.0.path().join("a.toml"), SLIDE).unwrap();
+    let output = haptize(folder.0.path(), &["bake", "a.toml", "--max-error=0.05 N", "--backend", "cpu"]);
+    let told = [output.stdout, output.stderr].concat();
+    let told = String::from_utf8_lossy(&told);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("rms error of 5.00e-2 N (") && !told.contains("N m"), "{told}");
+    let stiffer = haptize(folder.0.path(), &["bake", "a.toml", "--max-error=0.05 N m", "--backend", "cpu"]);
+    assert!(String::from_utf8_lossy(&stiffer.stderr).contains("measured in N: give it in N"));
 }
 
 /// What is solved beside the loop answers as `potential` in a dataset, and stays what the scene names.

@@ -190,6 +190,14 @@ impl<'a> RestSurface<'a> {
         closest
     }
 
+    /// Distance of `x` to the surface, negative inside; `near` is a triangle near by, if any is known (m).
+    #[must_use]
+    pub fn signed_distance(&self, x: DVec3, near: u32) -> f64 {
+        let closest = self.closest(x, near);
+        let distance = closest.distance_squared.sqrt();
+        if self.is_inside(x, &closest) { -distance } else { distance }
+    }
+
     /// Whether `x`, to which `closest` is closest, lies inside.
     #[must_use]
     pub fn is_inside(&self, x: DVec3, closest: &Closest) -> bool {

@@ -12,6 +12,9 @@ const HEAD: usize = 84;
 /// Bytes of a facet: a normal, three corners, two bytes of attributes.
 const FACET: usize = 50;
 
+/// Bytes in which a text names its solid and begins its first facet: a name is hardly longer.
+const TEXT_HEAD: usize = 1024;
+
 /// Bytes of a facet's normal.
 const NORMAL: usize = 12;
 
@@ -24,8 +27,8 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
     // Four characters of a text, read as a number, are more than half a billion facets: no text is as long as that.
     let nodes = match whole {
         Some((_, length)) if length == bytes.len() => binary(&bytes[HEAD..]),
-        // A binary facet has bytes of zero, a text has none.
-        _ if !bytes.contains(&0) => ascii(&text::decode(&bytes))?,
+        // A binary facet has bytes of zero, and a text has none unless something else was put into it.
+        _ if !bytes.contains(&0) || is_text(&bytes) => ascii(&text::decode(&bytes))?,
         Some((count, length)) if length < bytes.len() => {
             return Err(format!(
                 "{} bytes follow the last of the {count} facets that it announces, as where files were put one after \
@@ -46,6 +49,13 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
     Ok((nodes, triangles))
 }
 
+/// Whether `bytes` begin as an STL text does: with a solid and its first facet, in letters.
+fn is_text(bytes: &[u8]) -> bool {
+    let (head, _) = bytes.split_at(bytes.len().min(TEXT_HEAD));
+    let head = text::decode(head.split(|byte| *byte == 0).next().unwrap_or_default()).to_lowercase();
+    head.trim_start().starts_with("solid") && head.lines().any(|line| line.trim_start().starts_with("facet normal"))
+}
+
 fn binary(facets: &[u8]) -> Vec<DVec3> {
     let coordinate = |bytes: &[u8]| f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
     let node = |bytes: &[u8]| DVec3::new(coordinate(bytes), coordinate(&bytes[4..]), coordinate(&bytes[8..]));
@@ -57,6 +67,12 @@ fn ascii(text: &str) -> Result<Vec<DVec3>, String> {
     let (mut nodes, mut solid, mut facet) = (Vec::new(), None, None);
     for (number, line) in text::lines(text) {
         let bad = |what: &str| Err(format!("line {number}: {what}; export the mesh again"));
+        if line.contains('\0') {
+            return bad(
+                "it holds bytes of zero, which no text has: the file was damaged or filled up, or a binary one was put \
+                 behind it",
+            );
+        }
         let mut words = line.split_ascii_whitespace();
         let Some(keyword) = words.next() else { continue };
         match (keyword.to_ascii_lowercase().as_str(), solid, facet) {

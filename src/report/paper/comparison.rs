@@ -167,7 +167,10 @@ impl Comparison {
     /// The comparison as a page of Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let mut text = String::from("| Fig. | the paper | ours | file |\n|---|---|---|---|\n");
+        let mut text = String::from(
+            "# The paper's figures and numbers, remade by haptize\n\n\
+             | Fig. | the paper | ours | file |\n|---|---|---|---|\n",
+        );
         // Writing to a string cannot fail.
         for FigureNote { number, file, paper, ours } in &self.figures {
             let file = if file.is_empty() { String::new() } else { format!("`{file}.png`") };

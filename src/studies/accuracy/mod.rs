@@ -3,11 +3,11 @@
 //!
 //! The reference is equation (2) in the energy form, in f64, with the geometry that follows the deformation, solved to
 //! [`REFERENCE_TOLERANCE`](crate::sweep::REFERENCE_TOLERANCE) at random configurations of the scene's grid that no
-//! dataset holds. Its own error is how much it moves when it is asked for a hundredth of that. Errors are Euclidean
-//! norms over the joints; a prismatic joint counts with the lever arm of 0.1 m, so that all are N m. `rms` is over all
-//! configurations, in contact or not, and is set beside the rms of the reference torque itself. Errors are
-//! deterministic. Time is the least of some runs, because the work is the same in each and a busy machine only adds to
-//! it, over that of the scene as it is, with which all settings of a study take turns.
+//! dataset holds. Its own error is how much it moves when it is asked for a hundredth of that. Errors are
+//! [norms](crate::scene::EffortNorm) over the joints. `rms` is over all configurations, in contact or not, and is set
+//! beside the rms of the reference torque itself. Errors are deterministic. Time is the least of some runs, because the
+//! work is the same in each and a busy machine only adds to it, over that of the scene as it is, with which all
+//! settings of a study take turns.
 
 mod choice;
 mod direct;
@@ -23,7 +23,7 @@ use crate::{
     field::FieldError,
     object::ObjectError,
     proxy::Chain,
-    scene::{JointKind, Scene, SceneError},
+    scene::{JointKind, NormUnit, Scene, SceneError},
     sweep::{BackendError, BakeError, ReferenceError, build_object, reference::Reference, sample, spacing},
 };
 use serde::Serialize;
@@ -75,9 +75,9 @@ pub struct Row {
     pub bytes: usize,
     /// Time over that of the scene's own bake, of a look-up by `linear`, or of a configuration of the scene as it is.
     pub cost: f64,
-    /// Root mean square of the error (N m). Of mesh, nodes, skin and contact compliance: distance from the next row.
+    /// Root mean square of the error (the study's `norm`). Of mesh, nodes, skin and contact compliance: distance from the next row.
     pub rms: f64,
-    /// Greatest error (N m).
+    /// Greatest error (the study's `norm`).
     pub worst: f64,
 }
 
@@ -94,9 +94,11 @@ pub struct Accuracy {
     pub in_contact: usize,
     /// Left out, because the reference itself did not converge there.
     pub left_out: usize,
-    /// Root mean square of the reference torque (N m).
+    /// What torques and errors are measured in.
+    pub norm: NormUnit,
+    /// Root mean square of the reference torque (`norm`).
     pub torque: f64,
-    /// Error of the reference itself, rms (N m).
+    /// Error of the reference itself, rms (`norm`).
     pub reference_error: f64,
     /// Joints.
     pub joints: usize,
@@ -167,6 +169,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
         configurations: reference.exact.len(),
         in_contact: reference.in_contact,
         left_out: reference.left_out,
+        norm: reference.norm.unit,
         torque: reference.torque,
         reference_error: reference.own_error(scene, &model)?,
         joints: chain.joints.len(),

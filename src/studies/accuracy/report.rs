@@ -45,8 +45,9 @@ pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Rep
 fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
     let mut text = Vec::new();
     let mut table = Table::new(&mut text);
-    table.fields(["study", "series", "setting", "value", "points", "solved", "bytes", "cost"])?;
-    table.fields(["rms", "worst", "rms_relative"])?.end()?;
+    table.fields(["study", "series", "setting", "value", "points", "solved", "size [B]", "cost [1]"])?;
+    let unit = accuracy.norm.name();
+    table.fields([format!("rms [{unit}]"), format!("worst [{unit}]"), "relative rms [1]".to_owned()])?.end()?;
     for row in &accuracy.rows {
         let study = match row.study {
             Study::Spacing => "spacing",
@@ -70,11 +71,11 @@ fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
 /// # Errors
 /// None in a `String`.
 pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
-    let Accuracy { scene, configurations, in_contact, left_out, torque, reference_error, .. } = accuracy;
+    let Accuracy { scene, configurations, in_contact, left_out, norm, torque, reference_error, .. } = accuracy;
     writeln!(
         text,
         "{scene}: {configurations} random configurations, {in_contact} in contact, {left_out} left out; rms torque \
-         {torque:.4} N m, the reference errs by {reference_error:.1e}"
+         {torque:.4} {norm}, the reference errs by {reference_error:.1e}"
     )?;
     for name in Interpolation::ALL.map(Interpolation::name) {
         if let Some(order) = accuracy.order(Study::Spacing, name) {
@@ -147,10 +148,11 @@ fn pair(sheet: &mut Diagram, up: &str, mut panels: [(String, Vec<Series>); 2]) {
 /// Error against spacing and against grid points, with the Pareto front.
 fn spacing(accuracy: &Accuracy) -> Canvas {
     let Accuracy { configurations, torque, reference_error, unit, .. } = accuracy;
+    let effort = accuracy.norm.name();
     let mut sheet = Diagram::new(
         "Error of the rendered torque against grid spacing",
         &format!(
-            "{configurations} random configurations; rms torque {torque:.3} N m, known to {reference_error:.0e} N m"
+            "{configurations} random configurations; rms torque {torque:.3} {effort}, known to {reference_error:.0e} {effort}"
         ),
         1,
     );
@@ -161,10 +163,10 @@ fn spacing(accuracy: &Accuracy) -> Canvas {
         all
     };
     let across = with_worst(|row| (row.value, row.rms), |row| (row.value, row.worst));
-    sheet.panel(0, &format!("Grid spacing [{unit}]"), "Error [N m]", &across, &[]);
+    sheet.panel(0, &format!("Grid spacing [{unit}]"), &format!("Error [{effort}]"), &across, &[]);
     let costs = with_worst(|row| (row.solved as f64, row.rms), |row| (row.solved as f64, row.worst));
     let front: Vec<(f64, f64)> = accuracy.front().iter().map(|row| (row.solved as f64, row.rms)).collect();
-    sheet.panel(1, "Points solved [1]", "Error [N m]", &costs, &front);
+    sheet.panel(1, "Points solved [1]", &format!("Error [{effort}]"), &costs, &front);
     let dashes = Entry { name: "worst".into(), colour: colour::SOFT_INK, mark: Mark::Dashes };
     let best = Entry { name: "Pareto front".into(), colour: colour::series(5), mark: Mark::Dot };
     sheet.legend(&costs, vec![dashes, best]);
@@ -181,7 +183,7 @@ fn time(accuracy: &Accuracy) -> Canvas {
     let solved = curves(Study::Tolerance).into_iter().chain(rest).collect();
     let left = ("Time of a configuration, over the scene's own [1]".to_owned(), solved);
     let right = ("Time a tick, over linear's look-up [1]".to_owned(), curves(Study::Lookup));
-    pair(&mut sheet, "Rms error [N m]", [left, right]);
+    pair(&mut sheet, &format!("Rms error [{}]", accuracy.norm.name()), [left, right]);
     sheet.canvas()
 }
 
@@ -196,6 +198,6 @@ fn refinement(accuracy: &Accuracy) -> Canvas {
     };
     let left = panel("Length of edges, spacing of nodes", [Study::Mesh, Study::Links]);
     let right = panel("Bending stiffness, compliance", [Study::Skin, Study::Stiffness]);
-    pair(&mut sheet, "Rms change [N m]", [left, right]);
+    pair(&mut sheet, &format!("Rms change [{}]", accuracy.norm.name()), [left, right]);
     sheet.canvas()
 }

@@ -43,7 +43,7 @@ impl Judge {
         self.0.mean_forces()
     }
 
-    /// Rms of the torque (N m).
+    /// Rms of the torque (the unit of its norm).
     #[must_use]
     pub fn torque(&self) -> f64 {
         self.0.torque

@@ -29,13 +29,14 @@ use super::{
     Lowered,
     lowest::applies,
     node::Scale,
-    reference::{REFERENCE_TOLERANCE, TorqueNorm, tight},
+    reference::{REFERENCE_TOLERANCE, tight},
     thin_parts,
 };
 use crate::{
     JointVector,
     contact::{Backend, Model, Solvers, Status},
     dataset::Grid,
+    scene::EffortNorm,
     store::{Nodes, Place, PublishError, Space, SpaceError, Store, beyond, record::width},
 };
 use nodebook::{HeldNodes, Nodebook, held_bytes};
@@ -153,7 +154,7 @@ impl Refine<'_> {
     /// The base alone.
     fn begin<'a, B: Backend>(&'a self, backend: &'a mut B, lowest: bool) -> Result<Filling<'a, B>, RefineError> {
         let space = Space::new(&self.base, self.levels)?;
-        let norm = TorqueNorm::new(self.model.chain.joints.iter().map(|joint| joint.kind.unit()));
+        let norm = EffortNorm::new(self.model.chain.joints.iter().map(|joint| joint.kind.unit()));
         let scale = Scale::new(self.model, &space);
         let solvers = Solvers::new(self.model, rayon::current_num_threads());
         let mut book = Nodebook::new((space.clone(), scale), (backend, self.batch), solvers, lowest);
@@ -176,7 +177,7 @@ struct Leaf {
 /// A store that is being filled.
 struct Filling<'a, B> {
     book: Nodebook<'a, B>,
-    norm: TorqueNorm,
+    norm: EffortNorm,
     /// The nodes of each level.
     nodes: Vec<BTreeSet<Place>>,
     leaves: Vec<Leaf>,
