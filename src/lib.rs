@@ -114,6 +114,7 @@ mod joint_vector;
 pub mod memory;
 mod names;
 mod random;
+mod toml_text;
 
 pub use csv::TableError;
 pub use joint_matrix::JointMatrix;

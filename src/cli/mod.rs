@@ -44,6 +44,7 @@ mod new;
 mod on_demand;
 mod output;
 mod paper;
+mod place;
 mod plan;
 mod play;
 mod playback_report;
@@ -123,6 +124,8 @@ enum Command {
     New(new::Arguments),
     /// Remake the figures and numbers of the paper, with a table that compares them.
     Paper(paper::Arguments),
+    /// Put the tip of an arm before an object, and find a grid and a press there.
+    Place(place::Arguments),
     /// State what the shards of a bake take, with lines for job schedulers.
     Plan(plan::Arguments),
     /// Feel a dataset with a simulated hand or a real device: traces and figures.
@@ -152,6 +155,7 @@ impl Command {
             Self::Merge(arguments) => merge::run(arguments),
             Self::New(arguments) => new::run(arguments),
             Self::Paper(arguments) => paper::run(arguments),
+            Self::Place(arguments) => place::run(arguments),
             Self::Plan(arguments) => plan::run(arguments),
             Self::Play(arguments) => play::run(arguments),
             Self::Reach(arguments) => reach::run(arguments),

@@ -12,6 +12,7 @@ mod inertia;
 pub mod inverse_kinematics;
 mod jacobian;
 mod links;
+mod press;
 #[cfg(test)]
 mod random;
 
@@ -19,3 +20,4 @@ pub use chain::{Chain, Node, Pose};
 pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere};
 pub use dynamics::Dynamics;
 pub use links::Links;
+pub use press::{PRESS_GAP, Press};

@@ -32,7 +32,6 @@ mod robot;
 mod shape;
 mod surface;
 mod text;
-mod toml;
 
 pub use arm::{Arm, ArmJoint, Lock, Note};
 pub use drawn::drawn_shapes;

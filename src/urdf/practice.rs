@@ -6,25 +6,13 @@
 //! the node moves along n, into the ball.
 
 use crate::JointVector;
-use crate::proxy::{Chain, Pose};
+use crate::proxy::{Chain, PRESS_GAP, Pose, Press};
 use crate::random::Random;
-use crate::scene::JointKind;
 use glam::{DMat3, DVec3};
 
 /// Radius of the ball over the arm's reach, and its range (1, m).
 const RADIUS_PER_REACH: f64 = 0.1;
 const RADII: [f64; 2] = [0.01, 0.05];
-
-/// Gap between link and ball at the start, and how deep the motion presses, over the ball's radius (1).
-const GAP: f64 = 0.15;
-const DEPTH: f64 = 0.35;
-
-/// By how much the grid reaches beyond the motion at the link's end, over the ball's radius, and at most (1, rad).
-const MARGIN: f64 = 0.2;
-const MOST_MARGIN: f64 = 0.15;
-
-/// Lines of the grid along each axis, for 1 to 6 joints: some thousand configurations at most.
-const LINES: [usize; 6] = [33, 17, 13, 7, 5, 4];
 
 /// Postures that are tried: the middle of the limits, then random ones in the middle half.
 const POSTURES: usize = 64;
@@ -32,28 +20,14 @@ const POSTURES: usize = 64;
 /// Steps of the power iteration for n: enough for eigenvalues that differ by a tenth.
 const ITERATIONS: usize = 100;
 
-/// Least margin (rad or m): ten times the digits that are written.
-const LEAST_MARGIN: f64 = 1e-4;
-
-/// Shortest lever for which gains are given, over the longest (1): a joint that hardly moves the node needs some
-/// stiffness, too.
-const SHORTEST_LEVER: f64 = 0.2;
-
-/// Range of the levers (m): from a fingertip to the longest arm.
-const LEVERS: [f64; 2] = [0.01, 10.0];
-
 /// A ball, a grid and a motion.
 pub(super) struct Practice {
     /// (m)
     pub centre: DVec3,
     /// (m)
     pub radius: f64,
-    /// Least and greatest coordinate of the grid, and its lines, for each joint.
-    pub axes: Vec<([f64; 2], usize)>,
-    /// Where the motion begins and where it presses most.
-    pub motion: [JointVector; 2],
-    /// How far the node moves per joint coordinate, with which gains are scaled (m/rad, or 1).
-    pub levers: JointVector,
+    /// Grid and motion.
+    pub press: Press,
 }
 
 /// A posture with a ball before its last link.
@@ -87,40 +61,13 @@ impl Practice {
                     best = Some(posture);
                 }
             }
-            if best.as_ref().is_some_and(|best| best.clearance > 0.5 * GAP * best.radius) {
+            if best.as_ref().is_some_and(|best| best.clearance > 0.5 * PRESS_GAP * best.radius) {
                 break;
             }
         }
         let posture = best.unwrap_or_else(|| Posture::new(chain, &pose, JointVector::zeros(chain.joints.len()), 1.0));
-        Self::around(chain, &posture)
-    }
-
-    fn around(chain: &Chain, posture: &Posture) -> Self {
-        let Posture { q, node, direction, centre, radius, .. } = *posture;
-        let mut pose = chain.new_pose();
-        chain.pose(&q, &mut pose);
-        let columns: Vec<DVec3> = (0..q.len()).map(|joint| chain.jacobian_column(&pose, node, joint)).collect();
-        let square: f64 = columns.iter().map(|column| column.dot(direction).powi(2)).sum();
-        // By how much each joint moves where the node moves by a metre along the direction.
-        let way = columns.iter().map(|column| if square > 0.0 { column.dot(direction) / square } else { 0.0 });
-        let (mut start, mut end) = (q, q);
-        let mut axes = Vec::new();
-        for (j, (way, joint)) in way.zip(&chain.joints).enumerate() {
-            let [lower, upper] = joint.limits;
-            start[j] = rounded(q[j] - way * GAP * radius).clamp(lower, upper);
-            end[j] = rounded(q[j] + way * (GAP + DEPTH) * radius).clamp(lower, upper);
-            let most = if joint.kind == JointKind::Revolute { MOST_MARGIN } else { radius };
-            let margin = (MARGIN * radius / columns[j].length()).min(most).max(LEAST_MARGIN);
-            let range = [start[j].min(end[j]) - margin, start[j].max(end[j]) + margin];
-            axes.push((range.map(|end| rounded(end).clamp(lower, upper)), LINES[q.len().clamp(1, LINES.len()) - 1]));
-        }
-        let longest = columns.iter().map(|column| column.length()).fold(0.0, f64::max);
-        let levers = columns.iter().zip(&chain.joints).map(|(column, joint)| match joint.kind {
-            JointKind::Revolute => column.length().max(SHORTEST_LEVER * longest).clamp(LEVERS[0], LEVERS[1]),
-            JointKind::Prismatic => 1.0,
-        });
-        let levers = JointVector::from_slice(&levers.collect::<Vec<_>>());
-        Self { centre, radius, axes, motion: [start, end], levers }
+        let Posture { q, node, direction, centre, radius, .. } = posture;
+        Self { centre, radius, press: Press::along(chain, q, node, direction, radius) }
     }
 }
 
@@ -144,14 +91,9 @@ impl Posture {
         let base = pose.origins.first().copied().unwrap_or(DVec3::ZERO);
         let radius = (RADIUS_PER_REACH * pose.nodes[node].distance(base)).clamp(RADII[0], RADII[1]);
         let radius = (radius * 1e3).round() / 1e3;
-        let centre = pose.nodes[node] + (1.0 + GAP) * radius * direction;
+        let centre = pose.nodes[node] + (1.0 + PRESS_GAP) * radius * direction;
         let centre = (centre * 1e4).round() / 1e4;
         let clearance = pose.nodes.iter().map(|x| x.distance(centre) - radius).fold(f64::INFINITY, f64::min);
         Self { q, node, direction, centre, radius, clearance }
     }
-}
-
-/// Returns `coordinate` to a hundred thousandth of a radian or metre, as a scene shows it.
-fn rounded(coordinate: f64) -> f64 {
-    (coordinate * 1e5).round() / 1e5
 }

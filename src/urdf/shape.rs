@@ -1,7 +1,7 @@
 //! The end of the scene file: what is drawn of the links.
 
-use super::toml::{entry, heading, number, vector};
 use crate::scene::{LinkForm, LinkShape, ProxySpec};
+use crate::toml_text::{entry, heading, number, vector};
 use glam::{DQuat, DVec3, EulerRot};
 use std::fmt::Write;
 

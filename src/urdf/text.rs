@@ -1,13 +1,10 @@
 //! The scene file of an arm, as a person would have written it.
 
 use super::{Arm, ArmJoint, ContactNodes, Robot, UrdfError};
-use super::{
-    practice::Practice,
-    shape,
-    toml::{coarse, comment, entry, heading, list, number, significant, vector},
-};
-use crate::proxy::Chain;
+use super::{practice::Practice, shape};
+use crate::proxy::{Chain, Press};
 use crate::scene::{JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
+use crate::toml_text::{coarse, comment, entry, heading, list, number, significant, vector};
 use glam::DVec3;
 use std::fmt::Write;
 
@@ -109,39 +106,23 @@ fn write(
     writeln!(text, "[contact]")?;
     entry(text, "stiffness", "200.0", "N/m, of one contact spring; each node has three")?;
 
-    let points: usize = practice.axes.iter().map(|(_, lines)| lines).product();
-    let lines: Vec<String> = practice.axes.iter().map(|(_, lines)| lines.to_string()).collect();
-    heading(text, &format!("C-space: {} = {points} configurations", lines.join(" x ")))?;
+    let Practice { press, .. } = practice;
+    let lines: Vec<String> = press.axes.iter().map(|(_, lines)| lines.to_string()).collect();
+    heading(text, &format!("C-space: {} = {} configurations", lines.join(" x "), press.points()))?;
     writeln!(
         text,
         "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with \
          --max-error.\n"
     )?;
-    writeln!(text, "[grid]\naxes = [")?;
-    for (([start, stop], count), spec) in practice.axes.iter().zip(&proxy.joints) {
-        let unit = spec.kind.unit();
-        writeln!(
-            text,
-            "    {{ start = {}, stop = {}, count = {count} }}, # {unit}: {}",
-            number(*start, 9),
-            number(*stop, 9),
-            spec.name
-        )?;
-    }
-    writeln!(text, "]")?;
+    press.write_grid(text, &proxy.joints)?;
 
     heading(text, "The 1 kHz loop")?;
-    write_haptics(text, arm, proxy, practice)?;
+    write_haptics(text, arm, proxy, press)?;
     writeln!(text, "\n[graphics]")?;
     entry(text, "rate", "60.0", "Hz")?;
 
     heading(text, "Motions")?;
-    writeln!(text, "[motion]\n# Into the ball, hold, and off again.\npress = [")?;
-    let [start, end] = practice.motion.map(|q| list(&q, |x| number(*x, 9)));
-    for (time, q) in [(0.0, &start), (0.5, &start), (2.0, &end), (2.6, &end), (4.1, &start), (4.5, &start)] {
-        writeln!(text, "    {{ time = {time:?}, q = {q} }},")?;
-    }
-    writeln!(text, "]")
+    press.write_motion(text)
 }
 
 fn write_head(text: &mut String, robot: &Robot, arm: &Arm, joints: usize, command: &str) -> std::fmt::Result {
@@ -152,7 +133,10 @@ fn write_head(text: &mut String, robot: &Robot, arm: &Arm, joints: usize, comman
         comment(&format!("Arm of {joints} joints of the robot {:?}, taken from {file} by", robot.name))
     )?;
     writeln!(text, "#     {}", comment(command))?;
-    writeln!(text, "# against a soft ball, which is there for a start: put your own object in its place.\n#")?;
+    writeln!(
+        text,
+        "# against a soft ball, which is there for a start: put your own object in its place, delete\n# [grid] and [motion], and let `haptize place SCENE --write` make them anew.\n#"
+    )?;
     writeln!(text, "# All quantities are SI: m, rad, N, kg, s. Every key is explained in datasets/README.md.")?;
     if !arm.notes.is_empty() {
         writeln!(text, "#\n# Noticed in the robot's file:")?;
@@ -218,14 +202,14 @@ fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fm
 }
 
 /// Gains for a stiffness and a force at the contact node, in the proportions of a desktop device.
-fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, practice: &Practice) -> std::fmt::Result {
+fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, press: &Press) -> std::fmt::Result {
     writeln!(
         text,
         "# One number per joint: {TIP_STIFFNESS:.0} N/m and at most {TIP_FORCE:.0} N where the arm meets the ball, \
          through each joint's lever.\n"
     )?;
     writeln!(text, "[haptics]")?;
-    let stiffness: Vec<f64> = practice.levers.iter().map(|lever| TIP_STIFFNESS * lever * lever).collect();
+    let stiffness: Vec<f64> = press.levers.iter().map(|lever| TIP_STIFFNESS * lever * lever).collect();
     let scaled = |factor: f64| list(&stiffness, |k| coarse(factor * k));
     entry(text, "boundary_slope", &scaled(0.75), "N m/rad or N/m")?;
     entry(text, "proxy_damping", &scaled(2.5e-3), "N m s/rad or N s/m")?;
@@ -233,7 +217,7 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, practice: &Pra
     entry(text, "coupling_damping", &scaled(5e-4), "N m s/rad or N s/m")?;
     entry(text, "device_damping", &scaled(1.5e-3), "N m s/rad or N s/m")?;
     entry(text, "device_inertia", &scaled(5e-5), "kg m^2 or kg")?;
-    let limits: Vec<f64> = (practice.levers.iter().zip(&arm.joints))
+    let limits: Vec<f64> = (press.levers.iter().zip(&arm.joints))
         .map(|(lever, joint)| (TIP_FORCE * lever).min(joint.effort.unwrap_or(f64::INFINITY)))
         .collect();
     entry(text, "torque_limit", &list(&limits, |x| coarse(*x)), "N m or N")?;

@@ -29,13 +29,14 @@ fn refused(folder: &Path, arguments: &[&str], name: &str, expected: &str) {
 }
 
 /// Every argument by which a command reads a file; `@` stands for it.
-const READERS: [&[&str]; 24] = [
+const READERS: [&[&str]; 25] = [
     &["bake", "@"],
     &["bake", "@", "--max-error", "5%", "--refine", "2"],
     &["bake", "@", "--shard", "1/2"],
     &["plan", "@", "--shards", "2"],
     &["merge", "@", "-o", "y.haptize"],
     &["reach", "@"],
+    &["place", "@"],
     &["accuracy", "@"],
     &["info", "@"],
     &["inspect", "@", "--q=0,0"],

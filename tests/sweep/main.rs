@@ -9,6 +9,7 @@ mod inspection;
 mod lowest;
 mod max_error;
 mod memory;
+mod placing;
 #[cfg(unix)]
 mod program;
 mod reach;

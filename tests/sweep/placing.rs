@@ -1,0 +1,123 @@
+//! An arm before an object: what `place` finds touches, and what it says of an object out of reach would mend it.
+
+use crate::fixture::Folder;
+use glam::DVec3;
+use haptize::{
+    contact::{Model, Proximity},
+    object::Object,
+    proxy::Chain,
+    scene::Scene,
+    sweep::Placing,
+};
+use serde_json::Value;
+
+/// A planar arm of two links on a turntable, with a ball of 5 mm at its tip, and a soft ball within its reach.
+const SCENE: &str = r#"# My own arm.
+[object]
+sphere = { radius = 0.04, edge = 0.01, centre = [0.3, 0.1, 0.05] }
+skin = { tension = 100.0, width = 0.03, foundation = 4e4 } # as I like it
+[contact]
+stiffness = 200.0
+[[proxy.joint]]
+name = "turn"
+kind = "revolute"
+axis = [0, 0, 1]
+limits = [-3.0, 3.0]
+[[proxy.joint]]
+name = "shoulder"
+origin = [0, 0, 0.1]
+kind = "revolute"
+axis = [0, 1, 0]
+limits = [-1.5, 1.5]
+nodes = [{ at = [0.1, 0, 0] }, { at = [0.2, 0, 0] }]
+[[proxy.joint]]
+name = "elbow"
+origin = [0.25, 0, 0]
+kind = "revolute"
+axis = [0, 1, 0]
+limits = [-2.5, 2.5]
+nodes = [{ at = [0.1, 0, 0] }, { at = [0.2, 0, 0], radius = 0.005 }]
+"#;
+
+fn placed(text: &str, at: Option<DVec3>) -> (Scene, Placing) {
+    let scene = Scene::parse(text, "own.toml").unwrap();
+    let placing = Placing::new(&scene, at).unwrap();
+    (scene, placing)
+}
+
+#[test]
+fn the_tip_stands_before_the_point_and_the_press_goes_into_the_object() {
+    for at in [None, Some(DVec3::new(0.3, 0.1, 0.2)), Some(DVec3::new(0.2, 0.05, 0.05))] {
+        let (scene, placing) = placed(SCENE, at);
+        assert!(placing.reaches() && placing.is_clear(), "{placing:?}");
+        assert_eq!((placing.tip, placing.link.as_str()), (3, "elbow"));
+        let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+        let model = Model::reaching(&object, &chain, scene.contact, &[]).unwrap();
+        let mut proximity = Proximity::new(&model);
+        // The tip's ball keeps the standoff, and the point below it is on the surface.
+        let gap = proximity.gap(&placing.q);
+        let tip = proximity.pose().nodes[placing.tip];
+        let expected = placing.point + (0.005 + placing.standoff) * placing.normal;
+        assert!(tip.distance(expected) < 0.01 * placing.standoff, "{placing:?}");
+        assert!((gap - placing.standoff).abs() < 0.05 * placing.standoff, "{gap} {placing:?}");
+        assert!((placing.point.distance(placing.centre) - 0.04).abs() < 1.5e-3, "{placing:?}");
+        // The motion begins apart, presses by about a tenth of the body, and stays within grid and limits.
+        let [start, end] = placing.press.motion;
+        let (before, pressed) = (proximity.gap(&start), proximity.gap(&end));
+        assert!(before > 0.0 && (0.005..0.012).contains(&-pressed), "{before} {pressed}");
+        for (joint, ([low, high], count)) in placing.press.axes.iter().enumerate() {
+            let limits = scene.proxy.joints[joint].limits;
+            assert!(limits[0] <= *low && *high <= limits[1] && *count > 2);
+            assert!([start, end].iter().all(|q| (*low..=*high).contains(&q[joint])));
+        }
+    }
+}
+
+#[test]
+fn an_object_out_of_reach_is_reached_where_it_is_moved_as_told() {
+    let far = SCENE.replace("[0.3, 0.1, 0.05]", "[0.9, 0.1, 0.05]");
+    let (_, placing) = placed(&far, None);
+    assert!(!placing.reaches() && placing.short.length() > 0.3, "{placing:?}");
+    // A millimetre nearer than just reached.
+    let moved = placing.centre - 1.005 * placing.short;
+    let text = SCENE.replace("[0.3, 0.1, 0.05]", &format!("{:?}", moved.to_array()));
+    let (_, placing) = placed(&text, Some(placing.point - placing.short));
+    assert!(placing.reaches(), "{placing:?}");
+}
+
+#[test]
+fn a_scene_that_place_completes_keeps_its_comments_bakes_and_presses() {
+    let folder = Folder::new();
+    let path = folder.0.path();
+    std::fs::write(path.join("a.toml"), SCENE).unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+        command.current_dir(path).args(arguments).arg("--json").output().unwrap()
+    };
+    let placed = run(&["place", "a.toml", "--write"]);
+    assert!(placed.status.success(), "{}", String::from_utf8_lossy(&placed.stderr));
+    let text = std::fs::read_to_string(path.join("a.toml")).unwrap();
+    assert!(text.starts_with(SCENE.trim_end()) && text.contains("# as I like it"), "{text}");
+    let baked = run(&["bake", "a.toml", "--backend", "cpu"]);
+    let report: Value = serde_json::from_slice(&baked.stdout).unwrap();
+    assert!(baked.status.success() && report["contact_points"].as_u64() > Some(100), "{report}");
+    let played = run(&["play", "a.haptize"]);
+    let report: Value = serde_json::from_slice(&played.stdout).unwrap();
+    assert!(played.status.success() && report["contact_share"].as_f64() > Some(0.2), "{report}");
+
+    for (arguments, expected) in [
+        (&["place", "a.toml", "--write"][..], "has a [grid] or a [motion] already"),
+        (&["place", "a.toml", "--at", "1,2"], "three finite numbers"),
+        (&["place", "a.toml", "--at", "0,0,inf"], "three finite numbers"),
+        (&["place", "a.haptize"], "a.haptize"),
+    ] {
+        let refused = run(arguments);
+        assert_eq!(refused.status.code(), Some(1));
+        assert!(String::from_utf8_lossy(&refused.stderr).contains(expected), "{arguments:?}: {refused:?}");
+    }
+    std::fs::write(path.join("far.toml"), SCENE.replace("[0.3, 0.1, 0.05]", "[0.9, 0.1, 0.05]")).unwrap();
+    let refused = run(&["place", "far.toml", "--write"]);
+    let report: Value = serde_json::from_slice(&refused.stdout).unwrap();
+    assert!(refused.status.code() == Some(1) && report["refusal"].as_str().unwrap().contains("centre = "), "{report}");
+    assert!(!std::fs::read_to_string(path.join("far.toml")).unwrap().contains("[grid]"), "nothing is written");
+}
