@@ -14,7 +14,7 @@ use crate::{
         prediction::{Prediction, held_out, predict},
     },
     input,
-    logs::{ImportProgress, ImportReport, Imported, Mapping, import, total_size},
+    logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
     report::{self, gridized::gridized, hysteresis::hysteresis},
     ros::{JointStateTable, is_mcap},
     scan::{RowStatus, ScanLog},
@@ -82,15 +82,6 @@ pub struct Arguments {
 
 /// Figures beside [`report::FIGURES`].
 const FIGURES: [&str; 4] = ["gridized.svg", "gridized.png", "hysteresis.svg", "hysteresis.png"];
-
-/// Meaning of efforts.
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Effort {
-    /// Torque of the motors, which balances that of the contact.
-    Motor,
-    /// Torque of the contact on the arm.
-    Contact,
-}
 
 /// The measurements that were read.
 pub struct Source {
@@ -246,8 +237,7 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
         )
         .into());
     }
-    let scale = if arguments.effort == Effort::Contact { 1.0 } else { -1.0 };
-    Ok(Some(Mapping::of_joint_states(table.joints(), table.topic(), scale)))
+    Ok(Some(Mapping::of_joint_states(table.joints(), table.topic(), arguments.effort)))
 }
 
 /// Reads `logs`, a scan's or, through `mapping`, any tables.

@@ -1,7 +1,7 @@
 //! Whether the values of a column mapping can be, and where in its file stands one that cannot.
 
 use super::mapping::{ColumnName, Joint, Keep, Mapping};
-use crate::{MAX_JOINTS, names};
+use crate::{MAX_JOINTS, names, scene::effort_unit};
 use std::ops::Range;
 use toml::{
     Spanned,
@@ -60,6 +60,8 @@ impl Mapping {
         refuse(![',', '.'].contains(&table.decimal), "table.decimal", "table.decimal must be `.` or `,`")?;
         refuse(time.column.is_some() == time.period.is_some(), "time", "[time] needs either a column or a period")?;
         refuse(!is_positive(time.scale), "time.scale", "time.scale must be a positive number of seconds")?;
+        let other = time.unit.is_some_and(|unit| unit.in_si().1 != "s");
+        refuse(other, "time.unit", "time.unit must be one of time: s, ms or us")?;
         let period = time.period.unwrap_or(1.0);
         refuse(!is_positive(period), "time.period", "time.period must be a positive number of seconds")?;
         let parted = time.gap > 0.0;
@@ -92,9 +94,17 @@ fn check_joint(before: &[Joint], number: usize, joint: &Joint) -> Result<(), Ref
     let twin = before.iter().any(|other| other.name == *name);
     let message = format!("joint name `{name}` is empty or used twice");
     refuse(twin || name.is_empty(), format!("joint.{number}.name"), message)?;
-    let message = format!("unit of joint `{name}` must be `rad` or `m`; degrees and millimetres are scaled to these");
+    let message = format!(
+        "unit of joint `{name}` is that in the dataset, `rad` or `m`; that of a column stands beside it: position = {{ \
+         column = .., unit = \"deg\" }}"
+    );
     refuse(!["rad", "m"].contains(&joint.unit.as_str()), format!("joint.{number}.unit"), message)?;
     for (what, quantity) in [("position", &joint.position), ("torque", &joint.torque)] {
+        let wanted = if what == "torque" { effort_unit(&joint.unit) } else { &joint.unit };
+        let message =
+            format!("{what} of joint `{name}`, which moves in {}: its column needs a unit of {wanted}", joint.unit);
+        let other = quantity.unit.is_some_and(|unit| unit.in_si().1 != wanted);
+        refuse(other, format!("joint.{number}.{what}.unit"), message)?;
         let scaled = quantity.scale.is_finite() && quantity.scale != 0.0;
         let message = format!("{what} of joint `{name}`: scale must be a number other than zero");
         refuse(!scaled, format!("joint.{number}.{what}.scale"), message)?;

@@ -1,6 +1,7 @@
 //! Which columns of a log are what: a small TOML file, so that any table of joint positions and torques becomes a
 //! dataset without code. `datasets/instrument.toml` is an example with every key explained.
 
+use super::units::ColumnUnit;
 use crate::{
     dataset::JointLabel,
     scene::{self, Diagnostic},
@@ -66,7 +67,9 @@ pub enum BadRows {
 pub struct Time {
     /// The column of time stamps.
     pub column: Option<ColumnName>,
-    /// Seconds a unit of that column.
+    /// Unit of that column; absent: seconds.
+    pub unit: Option<ColumnUnit>,
+    /// What its numbers are multiplied by (1).
     #[serde(default = "one")]
     pub scale: f64,
     /// Time between rows where there is no column (s).
@@ -92,8 +95,8 @@ pub enum ColumnName {
 pub struct Joint {
     /// Its name in the dataset.
     pub name: String,
-    /// `rad` or `m`: the unit of the position after scaling.
-    #[serde(default = "radians")]
+    /// `rad` or `m`: the unit of the position in the dataset; by default that of its column, or `rad`.
+    #[serde(default)]
     pub unit: String,
     /// The joint's position.
     pub position: Quantity,
@@ -101,13 +104,15 @@ pub struct Joint {
     pub torque: Quantity,
 }
 
-/// `scale * column + offset`, in SI units.
+/// `scale * unit * column + offset`, in SI units.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quantity {
     /// Where it stands.
     pub column: ColumnName,
-    /// SI units a unit of the column.
+    /// Unit of the column; absent: that of SI.
+    pub unit: Option<ColumnUnit>,
+    /// What its numbers are multiplied by, besides their unit (1).
     #[serde(default = "one")]
     pub scale: f64,
     /// Added after scaling, in SI units.
@@ -132,6 +137,8 @@ pub struct Filter {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Torque {
+    /// What was measured.
+    pub effort: Effort,
     /// Which rows count, and how they are combined.
     pub keep: Keep,
     /// Name of the joint whose direction of motion counts; absent: the first.
@@ -140,6 +147,25 @@ pub struct Torque {
     pub still: f64,
     /// Rows are averaged in cells of C-space with these sides, one a joint (rad or m); needed for all but `all`.
     pub cell: Vec<f64>,
+}
+
+/// What the torques of a log are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Effort {
+    /// Torque of the motors, which balances that of the contact.
+    Motor,
+    /// Torque of the contact on the arm.
+    #[default]
+    Contact,
+}
+
+impl Effort {
+    /// The factor that makes contact torques of it (1).
+    #[must_use]
+    pub fn sign(self) -> f64 {
+        if self == Self::Motor { -1.0 } else { 1.0 }
+    }
 }
 
 /// Which rows count, and how they are combined.
@@ -194,9 +220,8 @@ const fn unlimited() -> f64 {
     f64::INFINITY
 }
 
-fn radians() -> String {
-    "rad".to_owned()
-}
+/// The unit of angles.
+const RADIANS: &str = "rad";
 
 /// Why a mapping was refused.
 #[derive(Debug, thiserror::Error)]
@@ -233,33 +258,44 @@ impl Mapping {
     pub fn parse(text: &str, path: &Path) -> Result<Self, MappingError> {
         let invalid =
             |place, message: &str| MappingError::Invalid(Box::new(Diagnostic::new(path, text, place, message)));
-        let mapping: Self =
+        let mut mapping: Self =
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
+        for joint in mapping.joints.iter_mut().filter(|joint| joint.unit.is_empty()) {
+            let own = joint.position.unit.map(|unit| unit.in_si().1).filter(|unit| ["rad", "m"].contains(unit));
+            joint.unit = own.unwrap_or(RADIANS).to_owned();
+        }
         mapping.check().map_err(|refusal| invalid(refusal.place(text), &refusal.message))?;
         Ok(mapping)
     }
 
-    /// Returns the mapping that takes all `joints` of a topic of joint states, as angles, with `scale` times their
-    /// efforts as contact torques. Messages that leave out a joint are dropped and counted.
+    /// Returns the mapping that takes all `joints` of a topic of joint states, as angles, with their efforts, which are
+    /// `effort`, as torques. Messages that leave out a joint are dropped and counted.
     #[must_use]
-    pub fn of_joint_states(joints: &[String], topic: &str, scale: f64) -> Self {
-        let quantity = |what: &str, joint: &String, scale| Quantity {
+    pub fn of_joint_states(joints: &[String], topic: &str, effort: Effort) -> Self {
+        let quantity = |what: &str, joint: &String| Quantity {
             column: ColumnName::Name(format!("{what} {joint}")),
-            scale,
+            unit: None,
+            scale: 1.0,
             offset: 0.0,
         };
         let joint = |name: &String| Joint {
             name: name.clone(),
-            unit: radians(),
-            position: quantity("position", name, 1.0),
-            torque: quantity("effort", name, scale),
+            unit: RADIANS.to_owned(),
+            position: quantity("position", name),
+            torque: quantity("effort", name),
         };
         Self {
             table: Table { bad_rows: BadRows::Drop, topic: Some(topic.to_owned()), ..Table::of_joint_states() },
-            time: Time { column: Some(ColumnName::Name("time".into())), scale: 1.0, period: None, gap: unlimited() },
+            time: Time {
+                column: Some(ColumnName::Name("time".into())),
+                unit: None,
+                scale: 1.0,
+                period: None,
+                gap: unlimited(),
+            },
             joints: joints.iter().map(joint).collect(),
             filter: Filter::default(),
-            torque: Torque::default(),
+            torque: Torque { effort, ..Torque::default() },
         }
     }
 

@@ -14,10 +14,14 @@ mod cells;
 mod check;
 mod mapping;
 mod rows;
+mod units;
 mod window;
 
 pub use cells::CellReport;
-pub use mapping::{BadRows, ColumnName, Filter, Joint, Keep, Mapping, MappingError, Quantity, Table, Time, Torque};
+pub use mapping::{
+    BadRows, ColumnName, Effort, Filter, Joint, Keep, Mapping, MappingError, Quantity, Table, Time, Torque,
+};
+pub use units::ColumnUnit;
 
 use crate::{
     JointVector,

@@ -3,6 +3,7 @@
 use super::{
     ImportError, Reason,
     mapping::{BadRows, ColumnName, Mapping, Quantity},
+    units::ColumnUnit,
 };
 use crate::{
     JointVector,
@@ -139,11 +140,11 @@ impl<'a, R: BufRead> Rows<'a, R> {
             return self.refuse(Reason::NotANumber, message).map(Some);
         }
         let skip = usize::from(layout.time.is_some());
-        let stamp = layout.time.map(|_| found[0] * self.mapping.time.scale);
+        let stamp = layout.time.map(|_| found[0] * in_si(self.mapping.time.unit) * self.mapping.time.scale);
         let (mut q, mut torque) = (JointVector::zeros(joints), JointVector::zeros(joints));
         for (joint, spec) in self.mapping.joints.iter().enumerate() {
             q[joint] = converted(&spec.position, found[skip + joint]);
-            torque[joint] = converted(&spec.torque, found[skip + joints + joint]);
+            torque[joint] = self.mapping.torque.effort.sign() * converted(&spec.torque, found[skip + joints + joint]);
         }
         self.timed(stamp, q, torque).map(Some)
     }
@@ -222,7 +223,12 @@ impl<'a, R: BufRead> Rows<'a, R> {
 }
 
 fn converted(quantity: &Quantity, raw: f64) -> f64 {
-    quantity.scale * raw + quantity.offset
+    in_si(quantity.unit) * quantity.scale * raw + quantity.offset
+}
+
+/// SI units that one of `unit` is (1).
+fn in_si(unit: Option<ColumnUnit>) -> f64 {
+    unit.map_or(1.0, |unit| unit.in_si().0)
 }
 
 /// The first of `names`, as many as a message has room for.

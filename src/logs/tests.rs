@@ -159,7 +159,11 @@ fn mappings_that_cannot_be_are_refused_with_the_line_and_the_key() {
     bad("name = \"a\"", "name = \"\"", "5:8", "is empty");
     bad("name = \"a\"", "name = \"a\\nb: 7128 points, sound\"", "5:8", "a\\u000ab: 7128");
     bad("name = \"a\"", "name = \"a\\u202eb\"", "5:8", "U+202E");
-    bad("name = \"a\"", "name = \"a\"\nunit = \"deg\"", "6:8", "degrees");
+    bad("name = \"a\"", "name = \"a\"\nunit = \"deg\"", "6:8", "unit = \"deg\" }");
+    bad("column = 2", "column = 2, unit = \"N\"", "6:33", "which moves in rad: its column needs a unit of rad");
+    bad("column = 2", "column = 2, unit = \"furlong\"", "6:33", "unknown variant `furlong`");
+    bad("column = 3", "column = 3, unit = \"N\"", "7:31", "which moves in rad: its column needs a unit of N m");
+    bad("column = 1\n", "column = 1\nunit = \"mm\"\n", "4:8", "time.unit");
     bad("[time]", "[torque]\nkeep = \"average\"\n[time]", "2:1", "torque.cell");
     bad("[time]", "[torque]\nlead = \"z\"\n[time]", "3:8", "`z`");
     bad("[time]", "[torque]\nstill = -1.0\n[time]", "3:9", "torque.still");
@@ -167,6 +171,30 @@ fn mappings_that_cannot_be_are_refused_with_the_line_and_the_key() {
     bad("[time]", "[filter]\ndecimate = 0\n[time]", "3:12", "decimate");
     bad("[time]", "[filter]\noutliers = -1.0\n[time]", "3:12", "outliers");
     assert!(Mapping::load(Path::new("no/such.toml")).err().unwrap().to_string().contains("no/such.toml"));
+}
+
+#[test]
+fn columns_in_degrees_and_millimetres_are_the_same_as_columns_in_si() {
+    let mapping = r#"
+        time = { column = 1, unit = "ms" }
+        torque = { effort = "motor" }
+        [[joint]]
+        name = "a"
+        position = { column = 2, unit = "deg", offset = 0.1 }
+        torque = { column = 3, unit = "N mm" }
+        [[joint]]
+        name = "b"
+        position = { column = 4, unit = "mm", scale = 2.0 }
+        torque = { column = 5, unit = "mN" }
+    "#;
+    let (samples, _) = read(mapping, "0,90,500,3,-7000\n1,-45,0,0,0\n").unwrap();
+    let units: Vec<&str> = samples.joints.iter().map(|joint| joint.unit.as_str()).collect();
+    assert_eq!(units, ["rad", "m"]);
+    let expected = [std::f64::consts::FRAC_PI_2 + 0.1, 0.006, 0.1 - std::f64::consts::FRAC_PI_4, 0.0];
+    assert!(samples.configurations.iter().zip(expected).all(|(q, expected)| (q - expected).abs() < 1e-15));
+    // What the motors do balances the contact.
+    let expected = [-0.5, 7.0, 0.0, 0.0];
+    assert!(samples.torques.iter().zip(expected).all(|(tau, expected)| (tau - expected).abs() < 1e-15));
 }
 
 #[test]

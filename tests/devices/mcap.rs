@@ -3,7 +3,7 @@
 use crate::program::FINGER;
 use haptize::{
     JointVector,
-    logs::{ImportError, Mapping, import},
+    logs::{Effort, ImportError, Mapping, import},
     proxy::Chain,
     ros::{Course, JointState, JointStateTable, JointStateWriter, RosError, is_mcap, topics},
     scan::{Plan, Trajectory, labels},
@@ -79,7 +79,7 @@ fn drop_outs_are_counted_and_efforts_become_contact_torques() {
     states[10].1.effort.clear();
     states[20].1.position = vec![f64::NAN];
     let path = file(folder.path(), "log.mcap", &states);
-    let mapping = Mapping::of_joint_states(&["x".to_owned()], "/joint_states", -1.0);
+    let mapping = Mapping::of_joint_states(&["x".to_owned()], "/joint_states", Effort::Motor);
     let imported = import(&mapping, &[path], &mut |_| ()).unwrap();
     assert_eq!(imported.report.samples, 48);
     let dropped = &imported.report.dropped[0];
@@ -97,7 +97,7 @@ fn joint_states_of_which_no_torque_can_be_made_are_refused_with_the_cause() {
     let refused = |states: Vec<(&str, JointState)>, joints: &[&str]| {
         let path = file(folder.path(), "log.mcap", &states);
         let joints: Vec<String> = joints.iter().map(|joint| (*joint).to_owned()).collect();
-        let mapping = Mapping::of_joint_states(&joints, "/joint_states", -1.0);
+        let mapping = Mapping::of_joint_states(&joints, "/joint_states", Effort::Motor);
         import(&mapping, &[path], &mut |_| ()).unwrap_err().to_string()
     };
     let states = |effort: &'static [f64], names: fn(u32) -> &'static str| -> Vec<(&'static str, JointState)> {
@@ -111,7 +111,7 @@ fn joint_states_of_which_no_torque_can_be_made_are_refused_with_the_cause() {
     // Of a topic with several publishers some joints may be chosen, however seldom they are told.
     let states_of_two = states(&[0.5], |k| ["gripper", "gripper", "arm"][k as usize % 3]);
     let path = file(folder.path(), "two.mcap", &states_of_two);
-    let mapping = Mapping::of_joint_states(&["arm".to_owned()], "/joint_states", -1.0);
+    let mapping = Mapping::of_joint_states(&["arm".to_owned()], "/joint_states", Effort::Motor);
     let report = import(&mapping, &[path], &mut |_| ()).unwrap().report;
     assert_eq!((report.samples, report.dropped[0].rows), (16, 34));
     // Two publishers, each of its own joint.
@@ -126,7 +126,7 @@ fn joint_states_of_which_no_torque_can_be_made_are_refused_with_the_cause() {
 #[test]
 fn recordings_of_other_kinds_are_named_with_the_program_that_converts_them() {
     let folder = tempfile::tempdir().unwrap();
-    let mapping = Mapping::of_joint_states(&["x".to_owned()], "/joint_states", -1.0);
+    let mapping = Mapping::of_joint_states(&["x".to_owned()], "/joint_states", Effort::Motor);
     let starts: [(&[u8], &str); 4] = [
         (b"\x28\xb5\x2f\xfd\x00\x50", "zstd -d"),
         (b"\x1f\x8b\x08", "gunzip"),
@@ -290,7 +290,7 @@ fn damaged_files_are_errors_with_the_remedy_and_never_panics() {
         (0..20_u32).map(|k| ("/a", state(u64::from(k), &["x"], &[f64::from(k)], &[1.0]))).collect();
     let path = file(folder.path(), "log.mcap", &states);
     let whole = fs::read(&path).unwrap();
-    let mapping = Mapping::of_joint_states(&["x".to_owned()], "/a", 1.0);
+    let mapping = Mapping::of_joint_states(&["x".to_owned()], "/a", Effort::Contact);
     let damaged = folder.path().join("damaged.mcap");
     for length in (8..whole.len()).step_by(7) {
         fs::write(&damaged, &whole[..length]).unwrap();

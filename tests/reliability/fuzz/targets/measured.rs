@@ -3,7 +3,7 @@
 use super::{Random, Target, mutate, outcome, shipped, write};
 use haptize::{
     gridize::{GridizeOptions, Interpolation, Samples, gridize},
-    logs::{Mapping, import},
+    logs::{Effort, Mapping, import},
     ros::{JointState, JointStateTable, topics},
     scan::ScanLog,
 };
@@ -189,7 +189,7 @@ fn imported(file: &Path) -> Result<Samples, String> {
     let topic = topics.first().ok_or("no topic")?.name.clone();
     let table = JointStateTable::open(file, Some(&topic)).map_err(|error| error.to_string())?;
     let joints: Vec<String> = table.joints().iter().take(3).cloned().collect();
-    let mapping = Mapping::of_joint_states(&joints, &topic, -1.0);
+    let mapping = Mapping::of_joint_states(&joints, &topic, Effort::Motor);
     let imported = import(&mapping, &[file.to_path_buf()], &mut |_| ()).map_err(|error| error.to_string())?;
     Ok(imported.samples)
 }
