@@ -42,7 +42,6 @@ mod memory;
 mod merge;
 mod motion;
 mod new;
-mod on_demand;
 mod output;
 mod paper;
 mod plan;
