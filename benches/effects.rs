@@ -71,7 +71,7 @@ fn main() {
     let ticks = in_turns(ROUNDS, count, |k| felt(&setups[k], &motion));
     let sampled = |k: usize| {
         let q = motion.at(motion.duration() * k as f64 / FRAMES as f64).0;
-        let sample = setups[PLAIN].haptics.field().sample(&q);
+        let sample = setups[PLAIN].haptics.source().field().unwrap().sample(&q);
         (q, if sample.contact { sample.share } else { 0.0 })
     };
     let places: Vec<Place> = (0..FRAMES).map(sampled).collect();

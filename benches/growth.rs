@@ -5,8 +5,7 @@
 //! The joints are the first ones of the arm of datasets/organ.toml; the others are held where its press is deepest.
 //! For each a store is filled for ever smaller errors, until it has `MOST` nodes (by default 70,000). The uniform grid
 //! for which it stands has the spacing of its finest level everywhere; its points are computed. Uniform grids of up to
-//! `MOST` points are solved, too. So are stores of ever more levels along the way of the scene's scrape, and nowhere
-//! else, as if it were felt. `FOLDER`, by default out/store, gets the figure.
+//! `MOST` points are solved, too. `FOLDER`, by default out/store, gets the figure.
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
@@ -15,9 +14,8 @@ mod clock;
 use clock::nanoseconds;
 use haptize::{
     JointVector,
-    contact::{Model, Solver},
+    contact::Model,
     dataset::Grid,
-    device::Motion,
     draw::{
         colour,
         diagram::{Diagram, Series},
@@ -26,26 +24,21 @@ use haptize::{
     proxy::Chain,
     report::write_both,
     scene::{ProxyNodeSpec, Scene},
-    store::{Space, Store, record::width},
+    store::{Store, record::width},
     sweep::{
-        CpuBackend,
-        ahead::{Ahead, Whereabouts},
-        build_object, grid_of,
+        CpuBackend, build_object, grid_of,
         refine::{Judge, Refine},
         sample,
     },
 };
 use rustix::time::{ClockId, clock_gettime};
-use std::{hint::black_box, path::Path, sync::Arc};
+use std::{hint::black_box, path::Path};
 
 /// Rms errors for which a store is filled, over the rms torque (1).
 const AIMS: [f64; 9] = [0.3, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001];
 
 /// Most levels for so many joints: the finest uniform grid has some 10^8 points, or the store no more levels.
 const LEVELS: [u32; 6] = [16, 12, 8, 6, 5, 4];
-
-/// Places along a way at which it is solved: one a millisecond.
-const PLACES: usize = 5000;
 
 /// Configurations in contact by which an error is measured: as many as `haptize bake --refine` takes.
 const JUDGED: usize = 400;
@@ -143,28 +136,8 @@ fn fill(refine: &Refine<'_>, judges: &mut [Judge; 2], backend: &mut CpuBackend<'
     cost(&refined.store, &refine.base, spent, error, way)
 }
 
-/// Fills a store of so many levels along `places`, and takes its costs there.
-fn explore(model: &Model<'_>, base: &Grid, levels: u32, places: &[JointVector], exact: &[JointVector]) -> Cost {
-    let store = Arc::new(Store::new(Space::new(base, levels).unwrap(), 2_000_000));
-    let (begin, ahead) = (processor_time(), Ahead::new(model, Arc::clone(&store)));
-    let mut solver = ahead.solver();
-    for q in places {
-        while ahead.advance(&mut solver, &Whereabouts::at_rest(q), false) {}
-    }
-    let spent = (processor_time() - begin, ahead.solved().nodes);
-    let (mut error, mut size) = (0.0, 0.0);
-    for (q, exact) in places.iter().zip(exact) {
-        error += store.sample(q).torque().iter().zip(exact.iter()).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        size += exact.dot(exact);
-    }
-    cost(&store, base, spent, (error / size).sqrt(), |k| places[k as usize % places.len()])
-}
-
-/// Costs of stores for ever smaller errors, of uniform grids, and of stores along a way.
-fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 3] {
-    let motion = Motion::through(&scene.motion.scrape, scene.proxy.joints.len()).unwrap();
-    let scrape = (0..PLACES).map(|k| JointVector::from_slice(&motion.at(1e-3 * k as f64).0[..joints]));
-    let scrape: Vec<JointVector> = scrape.collect();
+/// Costs of stores for ever smaller errors, and of uniform grids.
+fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 2] {
     let scene = held(scene, joints);
     let object = build_object(&scene).unwrap();
     let chain = Chain::new(&scene.proxy);
@@ -204,18 +177,11 @@ fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 3] {
             break;
         }
     }
-    let mut solver = Solver::new(&model);
-    let exact: Vec<JointVector> = scrape.iter().map(|q| solver.solve(q).torque).collect();
-    let mut explored = Vec::new();
-    for levels in 1..=LEVELS[joints - 1] {
-        explored.push(explore(&model, &base, levels, &scrape, &exact));
-        tell("way", &explored[explored.len() - 1]);
-    }
-    [stores, uniform, explored]
+    [stores, uniform]
 }
 
-/// Draws the costs of one kind of stores, those of uniform grids dashed beside them.
-fn draw(folder: &str, name: &str, [title, note]: [&str; 2], all: &[[Vec<Cost>; 3]], kind: usize, dashed: bool) {
+/// Draws the costs of stores, those of uniform grids dashed beside them.
+fn draw(folder: &str, name: &str, [title, note]: [&str; 2], all: &[[Vec<Cost>; 2]]) {
     let curves = |place: fn(&Cost) -> (f64, f64), dashed: bool| -> Vec<Series> {
         let curve = |kind: usize, dashed: bool| {
             all.iter().zip(1..).map(move |(costs, joints)| Series {
@@ -229,19 +195,19 @@ fn draw(folder: &str, name: &str, [title, note]: [&str; 2], all: &[[Vec<Cost>; 3
                 colour: joints - 1,
             })
         };
-        curve(kind, false).chain(curve(1, true).filter(|_| dashed)).collect()
+        curve(0, false).chain(curve(1, true).filter(|_| dashed)).collect()
     };
     let mut sheet = Diagram::new(title, note, 3);
     let uniform = "Points of the uniform grid of the finest spacing [1]";
     let error = "Rms error over rms torque [1]";
     sheet.panel(0, uniform, "Nodes solved [1]", &curves(|c| (c.uniform, c.nodes), false), &[]);
     sheet.panel(1, uniform, "Size of the file [bytes]", &curves(|c| (c.uniform, c.bytes), false), &[]);
-    sheet.panel(2, uniform, error, &curves(|c| (c.uniform, c.error), dashed), &[]);
-    sheet.panel(3, "Nodes solved [1]", error, &curves(|c| (c.nodes, c.error), dashed), &[]);
+    sheet.panel(2, uniform, error, &curves(|c| (c.uniform, c.error), true), &[]);
+    sheet.panel(3, "Nodes solved [1]", error, &curves(|c| (c.nodes, c.error), true), &[]);
     sheet.panel(4, uniform, "Look-up [ns]", &curves(|c| (c.uniform, c.look_up), false), &[]);
-    sheet.panel(5, uniform, "Processor time of a node solved [us]", &curves(|c| (c.uniform, c.node), dashed), &[]);
+    sheet.panel(5, uniform, "Processor time of a node solved [us]", &curves(|c| (c.uniform, c.node), true), &[]);
     let dashes = Entry { name: "uniform".into(), colour: colour::SOFT_INK, mark: Mark::Dashes };
-    sheet.legend(&curves(|c| (c.uniform, c.nodes), false), dashed.then_some(dashes).into_iter().collect());
+    sheet.legend(&curves(|c| (c.uniform, c.nodes), false), vec![dashes]);
     for file in write_both(Path::new(folder), name, &sheet.canvas()).unwrap() {
         println!("{}", file.display());
     }
@@ -253,10 +219,7 @@ fn main() {
     let most = arguments.get(1).map_or(70_000, |most| most.parse().unwrap());
     let scene = Scene::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/organ.toml"))).unwrap();
     println!("joints  kind     uniform points     nodes       bytes     error  look-up [ns]  CPU a node [us]");
-    let all: Vec<[Vec<Cost>; 3]> = (1..=LEVELS.len()).map(|joints| costs(&scene, joints, most)).collect();
+    let all: Vec<[Vec<Cost>; 2]> = (1..=LEVELS.len()).map(|joints| costs(&scene, joints, most)).collect();
     let texts = ["Stores filled for an error", "solid: ever smaller errors; dashed: uniform grids"];
-    draw(folder, "store-growth", texts, &all, 0, true);
-    let texts =
-        ["Stores filled along a way, one level more at each dot", "5 s of scraping; errors are those along the way"];
-    draw(folder, "store-way", texts, &all, 2, false);
+    draw(folder, "store-growth", texts, &all);
 }

@@ -4,7 +4,7 @@
 # bash docs/store.sh
 set -euo pipefail
 cd "$(dirname "$0")/.."
-for bench in store growth on_demand; do
+for bench in store growth; do
     cargo bench --locked --bench "$bench"
 done
-cp out/store/store-{error,growth,way,on-demand}.png docs/figures/
+cp out/store/store-{error,growth}.png docs/figures/

@@ -73,7 +73,7 @@ impl Baked {
     /// Where the proxy of `trace` was at each frame, and how much of the contact forces acted.
     fn places(&self, trace: &Trace) -> Vec<(JointVector, f64)> {
         let place = |tick: &haptize::render::trace::Tick| {
-            let sample = self.setup.haptics.field().sample(&tick.proxy);
+            let sample = self.setup.haptics.source().field().unwrap().sample(&tick.proxy);
             (tick.proxy, if sample.contact { sample.share } else { 0.0 })
         };
         trace.ticks.iter().step_by(16).map(place).collect()
@@ -203,7 +203,7 @@ fn a_tick_without_effects_is_the_papers_to_the_last_bit() {
         let y = tick.device;
         let mut w = JointVector::zeros(3);
         w.iter_mut().enumerate().for_each(|(a, w)| *w = (y[a] - before[a]) / period);
-        let sample = haptics.field().sample(&motion.position);
+        let sample = haptics.source().field().unwrap().sample(&motion.position);
         let torque = coupling.device_torque(&y, &w, &motion.position, &v_hat);
         assert_eq!(bits(&(motion.position, torque)), bits(&(tick.proxy, tick.device_torque)), "tick {k}");
         let stops = range.stops(&motion.position, &motion.velocity, period, proxy.limits());

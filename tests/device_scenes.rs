@@ -12,7 +12,7 @@ use haptize::{
     device::{LinearMap, Motion, Recorded},
     proxy::Chain,
     render::{flags::Flags, session, setup::Setup},
-    scene::{Rendering, Scene, Waypoint},
+    scene::{Algorithm, Rendering, Scene, Waypoint},
     sweep::{BackendChoice, Bake},
 };
 use std::{path::Path, process::Command, sync::atomic::AtomicBool};
@@ -211,9 +211,9 @@ fn beyond_a_grid(name: &str, grid: &[&str]) {
     assert!(free > 500 && held > 50, "{name}: {free} ticks free beyond the grid, {held} held at its border");
 }
 
-/// Nothing was baked: contact is solved while it is felt, kept, and felt again from what was kept.
+/// Nothing was baked: contact is solved in every tick, the same each time, recorded and replayed to the last bit.
 #[test]
-fn the_organ_is_felt_at_once_and_what_was_explored_is_a_dataset() {
+fn scenes_are_felt_at_once_and_replayed_as_they_were_felt() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
         let output =
@@ -221,34 +221,17 @@ fn the_organ_is_felt_at_once_and_what_was_explored_is_a_dataset() {
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         (output.status.success(), told, serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap())
     };
-    let scene = shipped("organ.toml").display().to_string();
-    let play = ["play", &scene, "--on-demand", "organ.haptize", "--seconds", "2.2", "--json"];
-    let (_, told, felt) = run(&play);
-    let explored = &felt["explored"];
-    // How much there is depends on how busy the machine is.
-    let nodes = explored["solved"]["nodes"].as_u64().unwrap();
-    assert!(nodes > 0 && explored["answers"]["ticks"].as_u64().unwrap() > 0, "{told} {felt:#}");
-    assert!(felt["max_relative_account_residual"].as_f64().unwrap() < 1e-9, "{felt:#}");
-    // It is a dataset like any other.
-    let (whole, told, info) = run(&["info", "organ.haptize", "--json"]);
-    assert!(
-        whole && info["points"].as_u64().unwrap() == 2304 && info["refinement"]["nodes"].is_array(),
-        "{told} {info:#}"
-    );
-    let (whole, told, again) = run(&["play", "organ.haptize", "--seconds", "2.2", "--json"]);
-    assert!(whole && again["explored"].is_null(), "{told} {again:#}");
-    let (whole, told, inspected) = run(&["inspect", "organ.haptize", "--q=0.02,0.6,-0.2,0.1,-1.5,0.1", "--json"]);
-    assert!(whole && inspected["interpolated"]["torque"].is_array(), "{told} {inspected:#}");
-    assert!(run(&["export", "organ.haptize", "--format", "npz", "--json"]).0);
-    // And is gone on with: what is there is not solved again.
-    let (_, told, more) = run(&play);
-    assert!(more["explored"]["known_blocks"].as_u64().unwrap() > 0, "{told} {more:#}");
-    // Not with another number of levels.
-    let output = Command::new(env!("CARGO_BIN_EXE_haptize"))
-        .args(play)
-        .args(["--levels", "3"])
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    assert!(!output.status.success() && String::from_utf8_lossy(&output.stderr).contains("another file"));
+    for name in ["organ.toml", "sphere.toml"] {
+        let scene = shipped(name).display().to_string();
+        let felt = ["play", &scene, "--seconds", "2.2", "--json", "--record", "session.csv"];
+        let (whole, told, felt) = run(&felt);
+        assert!(whole && felt["contact_share"].as_f64().unwrap() > 0.05, "{told} {felt:#}");
+        assert!(felt["max_relative_account_residual"].as_f64().unwrap() < 1e-9, "{felt:#}");
+        assert_eq!(felt["unconverged"], 0, "{felt:#}");
+        let follows = Scene::load(&scene).unwrap().contact.algorithm != Algorithm::Rest;
+        assert_eq!(told.contains("law that follows the deformation"), follows, "{told}");
+        let (whole, told, again) = run(&["play", &scene, "--replay", "session.csv", "--json"]);
+        assert!(whole && again["replayed"] == true, "{told} {again:#}");
+        std::fs::remove_file(folder.path().join("session.csv")).unwrap();
+    }
 }

@@ -11,17 +11,15 @@ use desktop::{haptics, proxy};
 use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
-    contact::Model,
     control::{Clock, ClockError, LONGEST_ARREARS, Patience},
-    dataset::{Dataset, Provenance},
+    dataset::Dataset,
     device::{Applied, Device, Halt, HandError, Motion, Pointer, Reading, Scheduler, SimulatedHand},
     field::TorqueField,
-    proxy::Chain,
     render::{
         flags::Fault,
         graphics::Graphics,
         haptic::{Haptics, Inputs},
-        live::{Followed, Live, LiveEnds},
+        live::LiveScene,
         realtime::{self, Ends, Options, RATE, Recorder},
         recording::Recording,
         session::{Driver, Plan},
@@ -31,11 +29,7 @@ use haptize::{
         FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticsSpec, Interpolation, ProxyInertia, Scene,
         Waypoint,
     },
-    store::{Space, Store},
-    sweep::{
-        ahead::{Ahead, Follower},
-        baked, build_object, grid_of,
-    },
+    sweep::baked,
 };
 use std::{
     sync::{
@@ -102,7 +96,7 @@ fn the_real_time_loop_allocates_nothing() {
     let mut hand = hand(3);
     let goes_on = || Some(Patience::Spins);
     let mut clock = Clock::of(&hand, haptics.period(), RATE, &goes_on).unwrap();
-    let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
+    let mut driver = Driver::new(&haptics, &mut hand).unwrap();
     let (mut recorder, Ends { mut ticks, mut latest }) = Recorder::new(3);
     let (clear, mut count) = (driver.controller.clear(), 0);
     assert_no_alloc(|| {
@@ -178,7 +172,7 @@ fn a_maker_s_library_that_calls_at_another_rate_is_refused_and_the_last_torque_o
     }
     let mut device = called(rate, &last);
     let clock = Clock::of(&device, haptics.period(), RATE, &always).unwrap();
-    let mut driver = Driver::new(&haptics, &mut device, None).unwrap();
+    let mut driver = Driver::new(&haptics, &mut device).unwrap();
     // Into the object, and no farther.
     let (most, mut pushed) = (Instant::now() + Duration::from_secs(20), false);
     let timing = driver.run(clock, |_, _, _| {
@@ -209,7 +203,7 @@ fn no_tick_is_missed_that_is_done_in_arrears() {
         }
     };
     let mut clock = Clock::of(&hand, haptics.period(), RATE, &patience).unwrap();
-    let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
+    let mut driver = Driver::new(&haptics, &mut hand).unwrap();
     let (mut recorder, Ends { mut ticks, .. }) = Recorder::new(3);
     assert_no_alloc(|| {
         driver.pace(&mut clock, &mut |_, record, paced| {
@@ -305,7 +299,7 @@ fn a_loop_that_keeps_missing_its_deadlines_lets_go_without_a_jump_and_says_why()
     // Time is told, not waited for: pressed for a second on time, then as the machine allows.
     let run = |late: f64| {
         let mut hand = along(3, [(0.0, -0.2), (0.5, 0.3)]);
-        let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
+        let mut driver = Driver::new(&haptics, &mut hand).unwrap();
         let (mut before, mut greatest) = (JointVector::zeros(3), 0.0);
         for k in 0..2000 {
             let interval = if k < 1000 { 1e-3 } else { late };
@@ -339,7 +333,7 @@ fn the_first_deadline_comes_after_the_system_has_granted_what_it_grants() {
     let mut hand = hand(3);
     let goes_on = || Some(Patience::Spins);
     let mut clock = Clock::of(&hand, haptics.period(), RATE, &goes_on).unwrap();
-    let mut driver = Driver::new(&haptics, &mut hand, None).unwrap();
+    let mut driver = Driver::new(&haptics, &mut hand).unwrap();
     // As long as memory may take to be locked.
     std::thread::sleep(Duration::from_millis(200));
     clock.begin();
@@ -421,59 +415,37 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     assert!(touched > 36 * 20, "{touched}");
 }
 
-/// Contact solved between the ticks, by stores of both orders and at the proxy; and what a store then holds by itself.
+/// Contact solved in every tick, with friction at its contacts: from the first touch on, along the surface, out of the
+/// region, and where a device says what none should.
 #[test]
-fn contact_that_is_solved_meanwhile_allocates_nothing_in_a_tick() {
-    let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/organ.toml")).unwrap();
-    let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
-    let mut model = Model::new(&object, &chain, scene.contact);
-    model.with_tangent = true;
-    let grid = grid_of(&scene);
-    let space = Space::new(&grid, 2).unwrap();
-    let levers = JointVector::from_slice(&[0.3; MAX_JOINTS]);
+fn contact_that_is_solved_live_allocates_nothing_in_a_tick() {
     let friction = "\n[haptics.friction]\ncoefficient = 0.3\nstiffness = 1000.0\n";
-    for (torque, forces) in [(false, false), (true, false), (false, true)] {
-        let store = Arc::new(Store::new(space.clone(), 20_000));
-        let ahead = Ahead::new(&model, Arc::clone(&store));
-        let text = scene.text.clone() + if forces { friction } else { "" };
-        let dataset = Dataset::refined(store, grid.clone(), None, text, Provenance::default());
-        let setup = if forces { Setup::explored(&dataset) } else { Setup::new(&dataset) }.unwrap();
-        // In contact from the beginning, where nothing is known yet.
-        let way = [Waypoint { time: 0.0, ..scene.motion.press[2] }, Waypoint { time: 0.3, ..scene.motion.press[3] }];
-        let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();
-        let followed = Followed { torque, forces };
-        let (live, ends) = Live::new(&way[0].q, 2, &levers, 1, followed);
-        let LiveEnds { mut whereabouts, solutions, mut answers } = ends;
-        let mut driver = Driver::new(&setup.haptics, &mut hand, Some(live)).unwrap();
-        let (mut solutions, mut solver, mut follower) =
-            (solutions, ahead.solver(), Follower::new(&model).with_forces(forces));
-        for k in 0..600 {
-            assert_no_alloc(|| driver.tick(1e-3, 1e-3));
-            if let Some(solutions) = &mut solutions {
-                // Sometimes late.
-                if k % 50 < 30 {
-                    solutions.write(follower.solve(whereabouts[1].read()));
+    for (name, effects) in [("organ", ""), ("organ", friction), ("sphere", ""), ("mesh", "")] {
+        let file = format!("{}/datasets/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(&file).unwrap() + effects;
+        let live = Arc::new(LiveScene::new(Scene::parse(&text, &file).unwrap()).unwrap());
+        let setup = Setup::live(Arc::clone(&live), &live.dataset()).unwrap();
+        let joints = setup.chain.joints.len();
+        for way in [&setup.scene.motion.press, &setup.scene.motion.scrape] {
+            let motion = Motion::through(way, joints).unwrap();
+            let mut state = setup.haptics.start(&motion.at(0.0).0).unwrap();
+            let mut contact = setup.haptics.source().begin();
+            let mut touched = 0;
+            assert_no_alloc(|| {
+                for k in 0..(1e3 * motion.duration()) as usize {
+                    let mut position = motion.at(1e-3 * k as f64).0;
+                    position[0] += if k % 1000 > 990 { 10.0 } else { 0.0 };
+                    position[0] = if k % 1000 == 995 { f64::NAN } else { position[0] };
+                    let inputs = Inputs { position, age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+                    let output = setup.haptics.tick_with(&mut state, &inputs, &mut contact);
+                    touched += usize::from(output.sample.contact);
+                    if output.fault.is_some() {
+                        let _ = setup.haptics.restart(&mut state, &inputs.position);
+                    }
                 }
-            }
-            if k % 10 == 0 {
-                ahead.advance(&mut solver, whereabouts[0].read(), false);
-            }
+            });
+            assert!(touched > 100, "{name}: {touched} ticks in contact");
         }
-        let answers = answers.read();
-        assert_eq!(answers.direct > 0, torque, "{answers:?}");
-        assert!(answers.changes > 0, "{answers:?}");
-        if forces {
-            continue;
-        }
-        let mut hand = setup.hand(Motion::through(&way, MAX_JOINTS).unwrap()).unwrap();
-        let mut driver = Driver::new(&setup.haptics, &mut hand, None).unwrap();
-        let mut touched = 0;
-        assert_no_alloc(|| {
-            for _ in 0..300 {
-                touched += usize::from(driver.tick(1e-3, 1e-3).0.sample.contact);
-            }
-        });
-        assert!(touched > 20, "{touched} ticks in contact");
     }
 }
 
@@ -513,7 +485,8 @@ fn a_slow_frame_rate_does_not_hold_up_the_end_of_a_session() {
     let data = sphere();
     let setup = Setup::new(&data).unwrap();
     let slow = GraphicsSpec { rate: 0.05, effects: GraphicsEffects::default() };
-    let mut graphics = Graphics::new(&data, setup.object.as_ref().unwrap(), &slow).unwrap();
+    let forces = setup.contact_forces(&data).unwrap().unwrap();
+    let mut graphics = Graphics::new(forces, setup.object.as_ref().unwrap(), &slow).unwrap();
     let mut hand = setup.hand(Motion::through(&setup.scene.motion.press, 3).unwrap()).unwrap();
     let plan = setup.plan(&data, 0.1, 0);
     let began = Instant::now();

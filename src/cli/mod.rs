@@ -41,7 +41,6 @@ mod max_error;
 mod merge;
 mod motion;
 mod new;
-mod on_demand;
 mod output;
 mod paper;
 mod place;

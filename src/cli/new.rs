@@ -17,7 +17,7 @@ Examples:
   haptize new --from touch               writes a scene for the Touch (Phantom Omni)
   haptize new --from organ               writes a scene of six joints, felt while it is solved
 
-Next: edit the file, then do what the command names: bake the scene, scan it, or feel it on demand.")]
+Next: edit the file, then do what the command names: bake the scene, scan it, or feel it at once.")]
 pub struct Arguments {
     /// The scene to begin with.
     #[arg(long, default_value = "sphere")]
@@ -91,10 +91,10 @@ impl Example {
 
     /// The command that the file `scene` is for.
     fn next(self, scene: &Path) -> String {
-        let [file, explored] = [scene, &scene.with_extension("haptize")].map(shell::file);
+        let file = shell::file(scene);
         match self {
             _ if self.is_scanned() => format!("haptize scan {file}"),
-            Self::Organ => format!("haptize play {file} --on-demand {explored}"),
+            Self::Organ => format!("haptize play {file}"),
             _ => format!("haptize bake {file}"),
         }
     }

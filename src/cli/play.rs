@@ -1,21 +1,21 @@
-//! `haptize play`: a dataset felt by a simulated hand, and the object seen to deform; traces and figures of it.
+//! `haptize play`: a dataset, or a scene that is solved live, felt by a simulated hand, and the object seen to deform;
+//! traces and figures of it.
 
 use super::{
     Failure, Report, interrupt,
     keyboard::Keyboard,
     motion,
-    on_demand::{self, Explored, Exploring},
     output::{self, Content, Earlier, Folder},
     playback_report::{Beside, PlaybackReport},
     played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, play_timed, traced, unwritten, write},
-    shell, tell,
+    tell,
     watch::warn_of_free_space,
 };
 use crate::{
-    dataset::{self, Dataset, replace_file},
+    dataset::{Dataset, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
-        effects::ContactEffects,
+        live::LiveScene,
         mcap,
         realtime::Options,
         recording::Recording,
@@ -42,11 +42,11 @@ Examples:
   haptize play sphere.haptize --motion hand.csv --seconds 10 --realtime
   haptize play sphere.haptize --record session.csv
   haptize play sphere.haptize --motion session.mcap
-  haptize play organ.toml --on-demand organ.haptize      nothing baked: contact is solved where the hand goes, and kept
+  haptize play organ.toml                                nothing baked: contact is solved in every tick
   haptize play sphere.haptize --replay session.csv
   haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
 pub struct Arguments {
-    /// The dataset's file; with --on-demand a scene.
+    /// A dataset, or a scene: contact is then solved in every tick, before the surface at rest, and nothing is baked.
     dataset: PathBuf,
     /// Motion of the hand: `press` or `scrape` as in the scene, a CSV file of times (s) and joint coordinates, or joint
     /// states in MCAP, such as a session that --record wrote.
@@ -75,8 +75,7 @@ pub struct Arguments {
     /// joint states in MCAP, for other programs and for --motion; only the table that other names give can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Replay the session in this file and check that it matches bit for bit. One on demand is replayed with the dataset
-    /// that it left, if its scene names all gains.
+    /// Replay the session in this file and check that it matches bit for bit.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
     replay: Option<PathBuf>,
     /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
@@ -85,41 +84,28 @@ pub struct Arguments {
     /// Another dataset, played with the same motion: the forces at the ends of both arms are drawn in one figure.
     #[arg(long, value_name = "DATASET", conflicts_with = "replay")]
     beside: Option<PathBuf>,
-    /// Begin at once, against the clock, from a scene of which nothing was baked: contact is solved ahead of the
-    /// motion, coarse before fine, and kept in this file, a dataset, from time to time and in the end. What it holds
-    /// already is used.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "beside"])]
-    on_demand: Option<PathBuf>,
-    #[command(flatten)]
-    choices: on_demand::Choices,
 }
 
 /// Longest session (s): all its ticks are kept in memory, half a gigabyte for each ten minutes at 1 kHz.
 const LONGEST: f64 = 3600.0;
 
-/// Plays the dataset.
+/// Plays the dataset or the scene.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
-    let Outputs { filled, recorded, explored } = Outputs::check(arguments, &folder)?;
-    let kept = arguments.on_demand.as_ref();
-    let exploring = kept.map(|file| arguments.choices.open(&arguments.dataset, file)).transpose()?;
-    let dataset = match &exploring {
-        Some(exploring) => exploring.on_demand.dataset(),
-        None => load(&arguments.dataset)?,
+    let Outputs { filled, recorded } = Outputs::check(arguments, &folder)?;
+    let live = live(&arguments.dataset)?;
+    let dataset = Arc::new(match &live {
+        Some(scene) => scene.dataset(),
+        None => Dataset::load(&arguments.dataset)?,
+    });
+    let setup = match &live {
+        Some(scene) => Setup::live(Arc::clone(scene), &dataset),
+        None => Setup::new(&dataset),
     };
-    let setup = if exploring.is_some() { Setup::explored(&dataset) } else { Setup::new(&dataset) };
     let setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
-    let is_table = |file: &PathBuf| !output::is_mcap(file);
-    let needs_solved_forces = setup.haptics.effects().is_some_and(ContactEffects::need_solved_forces);
-    if needs_solved_forces && arguments.record.as_ref().is_some_and(is_table) {
-        return Err("friction and contact damping act on demand by contact forces that no recording holds: leave out \
-                    --record, or record joint states (a name that ends in .mcap)"
-            .into());
-    }
-    if let Some(advice) = &setup.advice {
-        tell(format_args!("haptize: note: {advice}"));
-    }
-    let clearance = if exploring.is_some() { None } else { warn_of_free_space(&dataset)? };
+    let notes = live.iter().filter_map(|scene| scene.notice()).chain(setup.advice.as_deref());
+    notes.for_each(|note| tell(format_args!("haptize: note: {note}")));
+    let clearance = if live.is_some() { None } else { warn_of_free_space(&dataset)? };
     let open_beside = |path| -> Result<Beside<'_>, Failure> {
         let motion = motion::named(&setup, &dataset, &arguments.motion, arguments.topic.as_deref())?;
         Beside::open(path, &setup, motion)
@@ -133,27 +119,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             told = Some(line);
             Ok(played)
         }
-        None => {
-            let mut session = || perform(&setup, &dataset, arguments, exploring.as_ref(), on_tick);
-            match &exploring {
-                Some(exploring) => exploring.keep(None, session),
-                None => session(),
-            }
-        }
+        None => perform(&setup, &dataset, arguments, on_tick),
     })?;
-    let dataset = Arc::new(match &exploring {
-        Some(exploring) => {
-            // The base is large: one at a time.
-            drop(dataset);
-            // With what was solved meanwhile.
-            exploring.on_demand.dataset()
-        }
-        None => dataset,
-    });
     if let Some(timing) = &played.timing {
         timing.refused.iter().for_each(|refused| tell(format_args!("haptize: note: {refused}")));
     }
-    let mut files: Vec<PathBuf> = kept.into_iter().cloned().collect();
+    let mut files: Vec<PathBuf> = Vec::new();
     if let Some(file) = &arguments.record {
         record(&played, arguments, file)?;
         files.push(file.clone());
@@ -175,10 +146,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     outcome.describe(&mut text, arguments, &setup, &dataset, &felt)?;
     if let Some(file) = &arguments.record {
         writeln!(text, "recorded in {}", file.display())?;
-    }
-    if let (Some(explored), Some(file)) = (explored, kept) {
-        writeln!(text, "explored, kept in {}", file.display())?;
-        explored.tell(&mut text, &mut json["kept"]);
     }
     if let Some(recorded) = recorded {
         recorded.tell(&mut text, &mut json["recording"]);
@@ -220,7 +187,6 @@ impl<'a> Outcome<'a> {
         json["timing"] = serde_json::to_value(&played.timing)?;
         json["fault"] = fault.as_ref().map(|(time, reason)| json!({ "time": time, "reason": reason })).into();
         json["replayed"] = (*is_replay).into();
-        json["explored"] = played.explored.as_ref().map(Explored::json).into();
         json["device"] = device_json(arguments, tally)?;
         Ok(json)
     }
@@ -240,9 +206,6 @@ impl<'a> Outcome<'a> {
             writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {stiffness}")?;
         }
         felt.describe(text)?;
-        if let Some(explored) = &played.explored {
-            explored.describe(text, &dataset.grid)?;
-        }
         if let Some((time, reason)) = fault {
             writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
         }
@@ -281,7 +244,6 @@ fn perform(
     setup: &Setup,
     dataset: &Dataset,
     arguments: &Arguments,
-    exploring: Option<&Exploring>,
     on_tick: &mut dyn FnMut(&Tick),
 ) -> Result<Played, Failure> {
     let motion = motion::named(setup, dataset, &arguments.motion, arguments.topic.as_deref())?;
@@ -290,32 +252,25 @@ fn perform(
         return Err(format!("cannot play {seconds} s: give --seconds between 0 and {LONGEST}").into());
     }
     if let Some(address) = &arguments.device {
-        let how = How { seconds, hold_key: arguments.hold_key, exploring };
+        let how = How { seconds, hold_key: arguments.hold_key };
         return drive(setup, dataset, address, motion, how, on_tick);
     }
     let mut device: Box<dyn Device> =
         if arguments.exact { Box::new(Recorded::new(motion)) } else { Box::new(setup.hand(motion)?) };
-    if exploring.is_none() && !arguments.realtime {
+    if !arguments.realtime {
         return play(setup, dataset, device.as_mut(), seconds, on_tick);
     }
     let mut graphics = setup.graphics(dataset)?;
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
-    let (device, graphics) = (device.as_mut(), graphics.as_mut());
-    match exploring {
-        Some(exploring) => exploring.play(&setup.haptics, device, graphics, &plan, interrupt::stop_flag(), on_tick),
-        None => {
-            let options = Options { on_tick: Some(on_tick), ..Options::default() };
-            play_timed(&setup.haptics, device, graphics, &plan, options)
-        }
-    }
+    let options = Options { on_tick: Some(on_tick), ..Options::default() };
+    play_timed(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, options)
 }
 
 /// How a device is driven.
-struct How<'a> {
+struct How {
     /// Duration (s).
     seconds: f64,
     hold_key: bool,
-    exploring: Option<&'a Exploring>,
 }
 
 /// Feels the dataset with the device at `address`, until Ctrl-C at the latest. The simulated one is led along `motion`.
@@ -324,10 +279,10 @@ fn drive(
     dataset: &Dataset,
     address: &Address,
     motion: Motion,
-    how: How<'_>,
+    how: How,
     on_tick: &mut dyn FnMut(&Tick),
 ) -> Result<Played, Failure> {
-    let How { seconds, hold_key, exploring } = how;
+    let How { seconds, hold_key } = how;
     let hand = if address.kind == Kind::Simulated { Some(setup.hand(motion)?) } else { None };
     let (key, input) = Key::new();
     let _keyboard = if hold_key { Some(Keyboard::start(input)?) } else { None };
@@ -345,13 +300,8 @@ fn drive(
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     // Last of all: the motors go on. They go off before anything is drawn.
     let mut device = attach(guard, address, setup.chain.clone(), &setup.scene)?;
-    let played = match exploring {
-        Some(exploring) => exploring.play(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, stop, on_tick),
-        None => {
-            let options = Options { stop, on_tick: Some(on_tick), ..Options::default() };
-            play_timed(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, options)
-        }
-    };
+    let options = Options { stop, on_tick: Some(on_tick) };
+    let played = play_timed(&setup.haptics, device.as_mut(), graphics.as_mut(), &plan, options);
     interrupt::over();
     played
 }
@@ -363,18 +313,13 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Stri
     let trace = recording.replay(&setup.haptics, graphics.as_mut(), labels(&dataset.grid))?;
     if let Some(tick) = recording.first_difference(&trace) {
         let time = trace.ticks.get(tick).map_or(0.0, |tick| tick.time);
-        let why = if trace.solved_meanwhile {
-            "the scene or the version of haptize is another one than when it was recorded, or the scene leaves out gains, \
-             such as proxy_damping, which followed from less than is explored now: name them in [haptics], and record again"
-        } else {
-            "the dataset, its scene or the version of haptize is another one than when it was recorded"
-        };
+        let why = "the dataset, its scene or the version of haptize is another one than when it was recorded";
         return Err(
             format!("{}: the session differs from tick {tick}, at {time:.4} s, on: {why}", file.display()).into()
         );
     }
     let told = format!("{} ticks replayed, torque and proxy equal to the last bit\n", recording.ticks());
-    Ok((Played { trace: trace.into(), timing: None, explored: None }, told))
+    Ok((Played { trace: trace.into(), timing: None }, told))
 }
 
 /// Returns where traces and figures go.
@@ -409,24 +354,16 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
     Ok(())
 }
 
-/// Opens a dataset. The remedy for a scene is another one.
-fn load(path: &Path) -> Result<Dataset, Failure> {
-    Dataset::load(path).map_err(|error| match error {
-        dataset::Error::Foreign { .. } if Scene::load(path).is_ok() => format!(
-            "{}: is a scene: bake it first (haptize bake), or feel it at once (haptize play {} --on-demand FILE)",
-            path.display(),
-            shell::file(path)
-        )
-        .into(),
-        error => error.into(),
-    })
+/// The scene at `path`, prepared to be solved live; none where `path` is no scene.
+fn live(path: &Path) -> Result<Option<Arc<LiveScene>>, Failure> {
+    let is_scene = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    Ok(if is_scene { Some(Arc::new(LiveScene::new(Scene::load(path)?)?)) } else { None })
 }
 
 /// Returns which of the files that a session writes are there already.
 struct Outputs {
     filled: Folder,
     recorded: Option<Earlier>,
-    explored: Option<Earlier>,
 }
 
 impl Outputs {
@@ -435,12 +372,8 @@ impl Outputs {
         let read = [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay);
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).chain([Path::new(&arguments.motion)]).collect();
         let filled = Folder::check(folder, FILES.into_iter().chain(report::FIGURES), inputs.clone())?;
-        let read = inputs.iter().copied();
-        let recorded =
-            arguments.record.as_ref().map(|file| output::check(file, Content::Log, read.clone())).transpose()?;
-        let explored =
-            arguments.on_demand.as_ref().map(|file| output::check(file, Content::Dataset, read)).transpose()?;
-        arguments.record.iter().chain(&arguments.on_demand).try_for_each(|file| filled.keep_apart(file))?;
-        Ok(Self { filled, recorded, explored })
+        let recorded = arguments.record.as_ref().map(|file| output::check(file, Content::Log, inputs)).transpose()?;
+        arguments.record.iter().try_for_each(|file| filled.keep_apart(file))?;
+        Ok(Self { filled, recorded })
     }
 }

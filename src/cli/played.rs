@@ -1,6 +1,6 @@
 //! A session that was played: its files, and what there is to say about it.
 
-use super::{Failure, interrupt, on_demand::Explored, tell, telling_faults};
+use super::{Failure, interrupt, tell, telling_faults};
 use crate::{
     dataset::{Dataset, JointLabel, Replacement, discard_unfinished, replace_file},
     device::Device,
@@ -42,8 +42,6 @@ pub struct Played {
     pub trace: Arc<Trace>,
     /// How punctual it was, if it ran against the clock.
     pub timing: Option<Timing>,
-    /// Work done meanwhile, if any.
-    pub explored: Option<Explored>,
 }
 
 /// Plays for `seconds` what `device` does, as fast as it goes, and hands over the ticks.
@@ -58,7 +56,7 @@ pub fn play(
     let plan = setup.plan(dataset, seconds, SNAPSHOTS);
     let trace = session::run(&setup.haptics, device, graphics.as_mut(), &plan)?;
     trace.ticks.iter().for_each(on_tick);
-    Ok(Played { trace: trace.into(), timing: None, explored: None })
+    Ok(Played { trace: trace.into(), timing: None })
 }
 
 /// Plays as `plan` says what `device` does, against the clock.
@@ -69,11 +67,11 @@ pub fn play_timed(
     plan: &Plan,
     options: Options<'_>,
 ) -> Result<Played, Failure> {
-    let (mut nobody, Options { stop, live, on_tick }) = (|_: &Tick| (), options);
+    let (mut nobody, Options { stop, on_tick }) = (|_: &Tick| (), options);
     let mut on_tick = telling_faults(on_tick.unwrap_or(&mut nobody));
-    let options = Options { stop, live, on_tick: Some(&mut on_tick) };
+    let options = Options { stop, on_tick: Some(&mut on_tick) };
     let (trace, timing) = realtime::run(haptics, device, graphics, plan, options)?;
-    Ok(Played { trace: trace.into(), timing: Some(timing), explored: None })
+    Ok(Played { trace: trace.into(), timing: Some(timing) })
 }
 
 /// Runs `session`, which hands over its ticks, and writes them to `trace.csv` in `folder` as they come: however long
@@ -119,8 +117,7 @@ pub fn write(setup: &Setup, dataset: &Arc<Dataset>, played: &Played, folder: &Pa
         let names: Vec<_> = left_out.iter().filter_map(|file| file.file_name()?.to_str()).collect();
         tell(format_args!(
             "haptize: note: for want of time after the signal these are left out: {}; a session that ends by --seconds \
-             has them all, and `haptize play` draws a session that --record wrote (--replay FILE), and a dataset that \
-             was explored",
+             has them all, and `haptize play` draws a session that --record wrote (--replay FILE)",
             names.join(", ")
         ));
     }
@@ -160,7 +157,7 @@ pub fn describe(text: &mut String, s: &Summary, joints: &[JointLabel]) -> fmt::R
         (s.outside, "in free space outside the haptized range"),
         (s.held, "held at the border of the haptized range: for more room, bake a wider grid"),
         (s.absent, "beside absent grid points"),
-        (s.unconverged, "beside unconverged grid points"),
+        (s.unconverged, "beside unconverged grid points, or not solved in time"),
         (s.limited, "with the device's torque limited"),
         (s.faults, "without torque, after a fault"),
     ] {

@@ -1,6 +1,6 @@
 //! `haptize view`: the window, or one picture of it.
 
-use super::{Failure, Report, on_demand::Choices};
+use super::{Failure, Report};
 use crate::device::Address;
 use std::path::PathBuf;
 
@@ -12,12 +12,13 @@ Examples:
   haptize view                           the sphere of the demo
   haptize view sphere.haptize
   haptize view touch.haptize --device touch --hold-key
-  haptize view datasets/organ.toml --on-demand organ.haptize
+  haptize view datasets/organ.toml       nothing baked: contact is solved in every tick
   haptize view sphere.haptize --screenshot window.png --motion scrape --time 2.5 --dark",
     adapter_help!()
 ))]
 pub struct Arguments {
-    /// A scene, which is baked first, or a dataset; without one the paper's sphere.
+    /// A dataset, or a scene, whose contact is solved in every tick, before the surface at rest; without one the paper's
+    /// sphere, which is baked first.
     file: Option<PathBuf>,
     /// A real device leads the arm instead of the pointer: KIND or KIND:PLACE, as `haptize device list` shows it.
     #[arg(long, value_name = "NAME", conflicts_with = "screenshot")]
@@ -25,13 +26,6 @@ pub struct Arguments {
     /// Torque only while the space bar is held in the window (a dead-man key).
     #[arg(long, requires = "device")]
     hold_key: bool,
-    /// Bake nothing: solve contact ahead of the motion while it is felt, and keep what was explored in this file, from
-    /// time to time and when the window is closed. Of an earlier session of the same scene, it is where this one goes
-    /// on.
-    #[arg(long, value_name = "FILE", requires = "file", conflicts_with = "screenshot")]
-    on_demand: Option<PathBuf>,
-    #[command(flatten)]
-    choices: Choices,
     /// Write the window to this PNG file instead of opening it: needs no display, but some Vulkan, software too.
     #[arg(long, value_name = "PNG")]
     screenshot: Option<PathBuf>,
@@ -70,9 +64,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let (hold_key, stop) = (arguments.hold_key, interrupt::stop_flag_of_device());
         DeviceChoice { address, hold_key, stop }
     });
-    if let (Some(scene), Some(kept)) = (&arguments.file, &arguments.on_demand) {
-        return explore(scene, kept, arguments.choices, device);
-    }
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
     let Some(file) = &arguments.screenshot else {
         let shown = viewer::open(start, device);
@@ -103,35 +94,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     viewer::screenshot(&start, &picture, file)?;
     let (mut text, mut json) =
         (format!("wrote {}\n", file.display()), serde_json::json!({ "file": file.display().to_string() }));
-    earlier.tell(&mut text, &mut json);
-    Ok(Report { text, json, whole: true })
-}
-
-/// Opens the window on a scene whose contact is solved while it is felt, and keeps what was explored, however the
-/// window ends, by a signal, too.
-#[cfg(feature = "viewer")]
-fn explore(
-    scene: &std::path::Path,
-    kept: &std::path::Path,
-    choices: Choices,
-    device: Option<crate::viewer::DeviceChoice>,
-) -> Result<Report, Failure> {
-    use super::{
-        interrupt,
-        output::{self, Content},
-    };
-    use crate::viewer::{self, Start};
-    let earlier = output::check(kept, Content::Dataset, Some(scene))?;
-    let exploring = choices.open(scene, kept)?;
-    // The program ends soon after a signal, as by any.
-    exploring.keep(Some(interrupt::stop_flag()), || {
-        let shown = viewer::open(Start::OnDemand(std::sync::Arc::clone(&exploring.on_demand)), device);
-        interrupt::over();
-        Ok(shown?)
-    })?;
-    let blocks = exploring.on_demand.blocks();
-    let mut text = format!("{blocks} blocks explored, kept in {}\n", kept.display());
-    let mut json = serde_json::json!({ "blocks": blocks, "file": kept.display().to_string() });
     earlier.tell(&mut text, &mut json);
     Ok(Report { text, json, whole: true })
 }

@@ -68,8 +68,13 @@ impl Detection {
         &self.nodes
     }
 
-    /// A lower bound of the signed distance of each proxy node to the surface at rest, in the configuration taken up
-    /// (m).
+    /// A lower bound of the signed distance of proxy node `i` to the surface at rest, in the configuration taken up (m).
+    #[must_use]
+    pub fn distance(&self, i: usize) -> f64 {
+        self.at_rest[i].signed()
+    }
+
+    /// The same of all of them.
     pub fn distances(&self) -> impl Iterator<Item = f64> {
         self.at_rest.iter().map(RestDistance::signed)
     }
@@ -237,7 +242,7 @@ fn row_at_rest(model: &Model, i: usize, x: DVec3, closest: &Closest) -> Option<C
     }
     let facet = model.surface.facet_at_rest(closest.triangle);
     let direction = model.surface.pseudonormal_at_rest(closest.triangle, &closest.point);
-    Some(contact_with(model, i, x, closest, &facet, direction))
+    Some(contact_with(model, i, x, closest, facet, direction))
 }
 
 /// The contact (or near miss, with depth <= 0) of proxy node `i` at `x` with the closest point of `facet`, on the side

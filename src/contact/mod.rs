@@ -14,6 +14,7 @@ pub(crate) mod equilibrium;
 pub(crate) mod geometry;
 pub(crate) mod law;
 pub(crate) mod linear;
+mod live;
 mod mesh_ripple;
 mod model;
 mod node_tree;
@@ -25,6 +26,7 @@ mod thin_parts;
 
 pub use backend::{Backend, CHUNKS_IN_FLIGHT, Work};
 pub(crate) use equilibrium::energy::RESIDUAL_FLOOR;
+pub use live::{LiveContact, LiveSolver};
 pub use mesh_ripple::MeshRipple;
 pub use model::{Model, MotionBound};
 pub use node_tree::NodeTree;

@@ -6,9 +6,9 @@
 //! proxy whose deepest node is d below it moves by about d, hardly by more than [`EXPECTED_MOTION`] d. Results that
 //! need more are found and flagged.
 
+use super::Proximity;
 use super::detection::Detection;
 use super::model::Model;
-use super::{Equilibrium, Proximity};
 use crate::JointVector;
 use crate::object::{Compliance, Object, ObjectError};
 use crate::proxy::Chain;
@@ -94,25 +94,32 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
     }
 }
 
-/// Whether the compliance covers all that the result depends on, where no point of the surface has moved by more than
-/// `moved` (m).
-pub(super) fn covers(model: &Model<'_>, detection: &Detection, equilibrium: &Equilibrium, moved: f64) -> bool {
+/// Whether the compliance covers all that a result depends on whose forces are on the object's nodes `loaded` and on the
+/// proxy's nodes `touching`, where no point of the surface has moved by more than `moved` (m).
+pub(super) fn covers(
+    model: &Model<'_>,
+    detection: &Detection,
+    mut loaded: impl Iterator<Item = u32>,
+    touching: impl Iterator<Item = usize>,
+    moved: f64,
+) -> bool {
+    if model.compliance.is_whole() {
+        return true;
+    }
     let covered = |node: u32| model.compliance.place(node).is_some();
-    let mut within = equilibrium.forces.iter().all(|force| covered(force.node));
-    for (i, distance) in detection.distances().enumerate() {
-        if equilibrium.touches.iter().any(|touch| touch.proxy_node as usize == i) {
-            let x = detection.nodes()[i];
-            let radius = distance.abs() + 2.0 * moved + model.surface.bulge;
-            let squared = radius * radius + model.surface.bounds.slack(x);
-            model.surface.bounds.walk(x, squared, |leaf| {
-                if !model.covered_leaves[leaf] {
-                    let near = model.surface.bounds.leaves[leaf].near(x, squared);
-                    within &= near.flat_map(|t| model.surface.carriers(t).0).all(|&node| covered(node));
-                }
-                // Nothing more can change.
-                if within { squared } else { -1.0 }
-            });
-        }
+    let mut within = loaded.all(covered);
+    for i in touching {
+        let (x, distance) = (detection.nodes()[i], detection.distance(i));
+        let radius = distance.abs() + 2.0 * moved + model.surface.bulge;
+        let squared = radius * radius + model.surface.bounds.slack(x);
+        model.surface.bounds.walk(x, squared, |leaf| {
+            if !model.covered_leaves[leaf] {
+                let near = model.surface.bounds.leaves[leaf].near(x, squared);
+                within &= near.flat_map(|t| model.surface.carriers(t).0).all(|&node| covered(node));
+            }
+            // Nothing more can change.
+            if within { squared } else { -1.0 }
+        });
     }
     within
 }

@@ -3,7 +3,7 @@
 use super::detection::Detection;
 use super::equilibrium::energy::{EnergySearch, SolverStats, StoppingCriteria};
 use super::equilibrium::paper::PaperIteration;
-use super::equilibrium::rest::RestProgram;
+use super::equilibrium::rest::{RestProgram, Start};
 use super::linear::support::dot;
 use super::model::Model;
 use super::reach;
@@ -149,7 +149,15 @@ impl<'a> Solver<'a> {
         energy.hold(&equilibrium.forces);
         (self.held_by, self.displacement) = (HeldBy::Energy, None);
         let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length()).fold(0.0, f64::max);
-        reach::covers(self.model, &self.detection, equilibrium, moved)
+        self.covers_within(equilibrium, moved)
+    }
+
+    /// Whether the compliance covers all that `equilibrium` depends on, where the surface has moved by at most `moved`
+    /// (m).
+    fn covers_within(&self, equilibrium: &Equilibrium, moved: f64) -> bool {
+        let loaded = equilibrium.forces.iter().map(|force| force.node);
+        let touching = equilibrium.touches.iter().map(|touch| touch.proxy_node as usize);
+        reach::covers(self.model, &self.detection, loaded, touching, moved)
     }
 
     /// Whether the compliance covers all that `equilibrium` depends on.
@@ -160,13 +168,12 @@ impl<'a> Solver<'a> {
             HeldBy::Rest => Some(self.rest.elastic),
             HeldBy::Nothing | HeldBy::Paper => None,
         };
-        let within = |solver: &Self, moved: f64| reach::covers(model, &solver.detection, equilibrium, moved);
         model.compliance.is_whole()
-            || elastic.is_some_and(|elastic| within(self, model.motion_bound(elastic).moved))
+            || elastic.is_some_and(|elastic| self.covers_within(equilibrium, model.motion_bound(elastic).moved))
             || {
                 let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length());
                 let moved = moved.fold(0.0, f64::max);
-                within(self, moved)
+                self.covers_within(equilibrium, moved)
             }
     }
 
@@ -247,7 +254,7 @@ impl<'a> Solver<'a> {
     /// rows change along the surface, does not push back on the object.
     fn maximise(&mut self, equilibrium: &mut Equilibrium) -> SolverStats {
         let Self { model, detection, rest, node_forces, marked, touched, .. } = self;
-        let outcome = rest.solve(model, detection);
+        let outcome = rest.solve(model, detection, Start::Rest).unwrap_or_default();
         self.held_by = HeldBy::Rest;
         equilibrium.energy = rest.energy;
         for (i, row) in rest.rows.iter().enumerate().filter(|(_, row)| row.multiplier > 0.0) {
@@ -255,6 +262,7 @@ impl<'a> Solver<'a> {
             push_back(node_forces, marked, touched, &carriers, row.normal * row.multiplier);
             equilibrium.touches.push(Touch { proxy_node: row.proxy_node, carriers, force: rest.force(i) });
         }
+        equilibrium.touches.sort_unstable_by_key(|touch| touch.proxy_node);
         outcome
     }
 

@@ -10,7 +10,8 @@ bitflags! {
         const OUTSIDE = 1;
         /// A grid point around the proxy was not computed or measured: it counts as zero torque.
         const ABSENT = 1 << 1;
-        /// A grid point around the proxy is unconverged or overflowed: its torque is used, and not to be trusted.
+        /// A grid point around the proxy is unconverged or overflowed: its torque is used, and not to be trusted. Where
+        /// contact is solved in every tick, it was not in this one: the torque is the last that was solved.
         const UNCONVERGED = 1 << 2;
         /// The boundary layer holds the contact torque below the dataset's.
         const LAYER = 1 << 3;

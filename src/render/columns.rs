@@ -58,17 +58,6 @@ pub(super) const RECORDED: &[TickColumn] = &[
     ("held", |tick| Efforts(&mut tick.applied.torque)),
 ];
 
-/// Further columns of a recording whose contact was solved meanwhile, and would be solved otherwise another time.
-pub(super) const FELT: &[TickColumn] = &[
-    ("contact torque", |tick| Efforts(&mut tick.sample.torque)),
-    ("contact index", |tick| Number(&mut tick.sample.index)),
-    ("contact", |tick| Switch(&mut tick.sample.contact)),
-    ("contact nodes", |tick| Count(&mut tick.sample.contact_nodes)),
-    ("energy [J]", |tick| Number(&mut tick.sample.energy)),
-    ("share", |tick| Number(&mut tick.sample.share)),
-    ("remarks", |tick| Remarks(&mut tick.sample.flags)),
-];
-
 /// Number of fields of a row of `columns` for so many `joints`.
 pub(super) fn width(columns: &[TickColumn], joints: usize) -> usize {
     let mut any = Tick::default();

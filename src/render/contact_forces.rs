@@ -6,32 +6,28 @@
 //! and the factor that boundary layer and fade put on it, so that what is seen and what is felt stay
 //! `tau_bar = -sum_i J_i^T f`.
 //!
-//! *Solved.* A store of nodes at several levels keeps no forces. There a thread of its own solves the equilibrium of
-//! the scene in the dataset once a frame; its forces are those of the configuration itself.
+//! *Solved.* A store of nodes at several levels keeps no forces, and a scene that is solved live has stored nothing.
+//! There the equilibrium is solved once a frame; its forces are those of the configuration itself.
 
-use super::{force_rows::ForceRows, graphics_error::GraphicsError};
+use super::{force_rows::ForceRows, graphics_error::GraphicsError, live::LiveScene};
 use crate::{
-    contact::{Model, NodeForce, Solver, Status},
+    contact::{NodeForce, Solver, Status},
     dataset::{Dataset, Surface},
-    proxy::Chain,
     scene::Scene,
-    sweep::sample,
+    sweep::Direct,
 };
 use glam::DVec3;
-use std::{
-    sync::{
-        Mutex, PoisonError,
-        mpsc::{self, Receiver, Sender},
-    },
-    thread,
-};
+use std::sync::Arc;
 
 /// Contact forces on the object's nodes at any configuration.
 pub struct ContactForces(Source);
 
 enum Source {
     Stored(Box<ForceRows>),
-    Solved(Mutex<AtTheProxy>),
+    /// By the scene's own law.
+    Solved(Box<Direct>),
+    /// By the law at rest.
+    Live(Arc<LiveScene>),
 }
 
 impl ContactForces {
@@ -40,9 +36,8 @@ impl ContactForces {
     /// # Errors
     /// When there are none, or they do not fit.
     pub fn new(dataset: &Dataset, nodes: usize) -> Result<Self, GraphicsError> {
-        let solved = dataset.refinement.is_some();
         let source = match &dataset.surface {
-            Some(surface) if solved => Source::Solved(Mutex::new(AtTheProxy::new(dataset, surface, nodes)?)),
+            Some(surface) if dataset.refinement.is_some() => Source::Solved(Box::new(solved(dataset, surface, nodes)?)),
             _ => {
                 let contacts = dataset.contacts.as_ref().ok_or(GraphicsError::NoForces)?;
                 let rows = ForceRows::new(&dataset.grid, contacts, nodes).ok_or(GraphicsError::Rows { nodes })?;
@@ -52,6 +47,12 @@ impl ContactForces {
         Ok(Self(source))
     }
 
+    /// Those of a scene that is solved live.
+    #[must_use]
+    pub fn live(scene: Arc<LiveScene>) -> Self {
+        Self(Source::Live(scene))
+    }
+
     /// Whether `dataset` has them: stored, or because its object is known and can be solved with.
     #[must_use]
     pub fn known(dataset: &Dataset) -> bool {
@@ -59,77 +60,44 @@ impl ContactForces {
     }
 
     /// Writes the forces at `q`, times `share`, to `forces`, one entry per node of the object (N). Where an equilibrium
-    /// is solved for them, this waits for it; where none is found they are zero.
+    /// is solved for them this takes as long; where none is found they are zero.
     pub fn at(&self, q: &[f64], share: f64, forces: &mut [DVec3]) {
         forces.fill(DVec3::ZERO);
-        match &self.0 {
-            Source::Stored(rows) => rows.at(q, share, |node, scale, force| forces[node] += scale * force),
-            // A panic elsewhere leaves nothing half-written in it.
-            Source::Solved(solved) => {
-                solved.lock().unwrap_or_else(PoisonError::into_inner).add(q, share, forces);
+        let direct = match &self.0 {
+            Source::Stored(rows) => {
+                return rows.at(q, share, |node, scale, force| forces[node] += scale * force);
             }
-        }
-    }
-}
-
-/// Equilibria solved on request by a thread that holds object, chain and solver.
-struct AtTheProxy {
-    wanted: Sender<Vec<f64>>,
-    solved: Receiver<Vec<NodeForce>>,
-}
-
-impl AtTheProxy {
-    fn new(dataset: &Dataset, surface: &Surface, nodes: usize) -> Result<Self, GraphicsError> {
-        let scene = Scene::parse(&dataset.scene, "scene").map_err(|error| GraphicsError::Solved(error.to_string()))?;
-        let object = surface.object(&scene.object).map_err(|error| GraphicsError::Solved(error.to_string()))?;
-        if object.rest.len() != nodes {
-            return Err(GraphicsError::Rows { nodes });
-        }
-        let (wanted, places) = mpsc::channel::<Vec<f64>>();
-        let (answer, solved) = mpsc::channel();
-        let (report, ready) = mpsc::channel();
-        let work = move || {
-            let chain = Chain::new(&scene.proxy);
-            let model = match Model::reaching(&object, &chain, scene.contact, &sample(&scene)) {
-                Ok(model) => model,
-                Err(error) => return drop(report.send(Err(error.to_string()))),
-            };
-            let mut solver = Solver::new(&model);
-            drop(report.send(Ok(())));
-            for q in places {
-                let equilibrium = solver.solve(&q);
-                let forces = if equilibrium.status == Status::Contact { equilibrium.forces } else { Vec::new() };
-                if answer.send(forces).is_err() {
-                    break;
-                }
-            }
+            Source::Solved(direct) => direct,
+            Source::Live(scene) => scene.direct(),
         };
-        let begun = thread::Builder::new().name("drawn contact".into()).spawn(work);
-        begun.map_err(|error| GraphicsError::Threads(error.to_string()))?;
-        let ended = || Err("its thread ended".to_owned());
-        ready.recv().unwrap_or_else(|_| ended()).map_err(GraphicsError::Solved)?;
-        Ok(Self { wanted, solved })
-    }
-
-    fn add(&self, q: &[f64], share: f64, forces: &mut [DVec3]) {
-        // Out of contact nothing is solved. A thread that is gone answers nothing, and nothing moves.
-        if share > 0.0
-            && self.wanted.send(q.to_vec()).is_ok()
-            && let Ok(solved) = self.solved.recv()
-        {
-            for NodeForce { node, force } in solved {
-                forces[node as usize] += share * force;
-            }
+        // Out of contact nothing is solved.
+        if share > 0.0 {
+            let equilibrium = Solver::new(direct.model()).solve(q);
+            let solved = equilibrium.forces.iter().filter(|_| equilibrium.status == Status::Contact);
+            solved.for_each(|&NodeForce { node, force }| forces[node as usize] += share * force);
         }
     }
+}
+
+/// The scene of `dataset`, prepared to be solved with the geometry that it holds.
+fn solved(dataset: &Dataset, surface: &Surface, nodes: usize) -> Result<Direct, GraphicsError> {
+    let wrong = |error: &dyn std::fmt::Display| GraphicsError::Solved(error.to_string());
+    let scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(&error))?;
+    let object = surface.object(&scene.object).map_err(|error| wrong(&error))?;
+    if object.rest.len() != nodes {
+        return Err(GraphicsError::Rows { nodes });
+    }
+    Direct::of(&scene, object).map_err(|error| wrong(&error))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
+        contact::Model,
+        proxy::Chain,
         store::{Space, Store},
-        sweep::{CpuBackend, build_object, grid_of},
+        sweep::{CpuBackend, build_object, grid_of, sample},
     };
     use std::sync::Arc;
 

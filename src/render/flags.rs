@@ -34,6 +34,9 @@ pub enum Fault {
          passivity_control"
     )]
     Energy,
+    /// Contact has not been solved for longer than a torque may rest on a position.
+    #[error("contact was not solved in time: press less deep or bake the scene")]
+    Unsolved,
     /// The torque came out as no number: gains beyond all measure.
     #[error("the torque is not a number: lower the gains")]
     Torque,

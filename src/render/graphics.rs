@@ -8,7 +8,7 @@
 //! *Motion*: see [`ObjectMotion`].
 
 pub use super::{contact_forces::ContactForces, graphics_error::GraphicsError, object_motion::ObjectMotion};
-use crate::{dataset::Dataset, object::Object, scene::GraphicsSpec};
+use crate::{object::Object, scene::GraphicsSpec};
 use glam::DVec3;
 
 /// A low-pass filter on the contact forces.
@@ -45,13 +45,12 @@ pub struct Graphics<'object> {
 }
 
 impl<'object> Graphics<'object> {
-    /// `object`, deformed by the forces of `dataset`, at the rate and with the effects of `spec`.
+    /// `object`, deformed by the forces of `contact`, at the rate and with the effects of `spec`.
     ///
     /// # Errors
-    /// When forces, object and rate do not make a loop.
-    pub fn new(dataset: &Dataset, object: &'object Object, spec: &GraphicsSpec) -> Result<Self, GraphicsError> {
+    /// When object and rate do not make a loop.
+    pub fn new(contact: ContactForces, object: &'object Object, spec: &GraphicsSpec) -> Result<Self, GraphicsError> {
         let nodes = object.rest.len();
-        let contact = ContactForces::new(dataset, nodes)?;
         let motion = ObjectMotion::new(object, 1.0 / spec.rate, &spec.effects)?;
         let smoothing = spec.effects.smoothing.map(|time| Smoothing::new(time, motion.period(), nodes));
         Ok(Self { contact, motion, forces: vec![DVec3::ZERO; nodes], smoothing })

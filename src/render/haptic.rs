@@ -2,7 +2,7 @@
 //! allocation, no panic.
 //!
 //! At t_k: check the device's position; coupling torque for the device from y_k and x_k; contact torque tau_bar(x_k)
-//! from the dataset; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size,
+//! from a dataset, or solved; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size,
 //! and in rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at the
 //! greatest rate, without a jump; the fault stays, the proxy tied to the last good position, until
 //! [`Haptics::restart`]. So it is when the passivity observer of the device's port finds that the hand has been given
@@ -19,15 +19,15 @@ use super::{
     coupling::Coupling,
     effects::{ContactEffects, EffectState, Pending},
     flags::{Fault, Flags},
-    live::Live,
     npmi::{Motion, Npmi},
+    source::{Contact, TorqueSource},
     torque_history::TorqueHistory,
-    watchdog::{self, TickRate, Watchdog},
+    watchdog::{self, GREATEST_POSITION_AGE, TickRate, Watchdog},
 };
 use crate::{
     JointVector,
     contact::NodeForce,
-    field::{Sample, TorqueField, range::HaptizedRange},
+    field::{Sample, range::HaptizedRange},
     scene::HapticsSpec,
 };
 
@@ -37,7 +37,7 @@ pub const GREATEST_GIVEN_ENERGY: f64 = 0.1;
 
 /// Everything of the haptic loop that does not change from tick to tick.
 pub struct Haptics {
-    field: TorqueField,
+    source: TorqueSource,
     range: HaptizedRange,
     npmi: Npmi,
     coupling: Coupling,
@@ -69,16 +69,6 @@ pub struct State {
     accounts: Accounts,
     channels: Option<ChannelState>,
     effects: Option<EffectState>,
-}
-
-/// The contact that a tick feels.
-pub enum ContactSource {
-    /// The dataset's.
-    Dataset,
-    /// Solved meanwhile.
-    Live(Box<Live>),
-    /// Felt before, in a session that is replayed.
-    Recorded(Sample),
 }
 
 /// Output of a tick. All but `torque` is for recording and drawing.
@@ -113,11 +103,12 @@ pub struct JointsError {
 }
 
 impl Haptics {
-    /// A loop over `field` with the proxy `npmi` and the gains of `spec`. The proxy stays in the grid.
+    /// A loop over the torque of `source` with the proxy `npmi` and the gains of `spec`. The proxy stays in the grid.
     ///
     /// # Errors
     /// When they differ in their number of joints.
-    pub fn new(field: TorqueField, npmi: Npmi, spec: &HapticsSpec) -> Result<Self, JointsError> {
+    pub fn new(source: impl Into<TorqueSource>, npmi: Npmi, spec: &HapticsSpec) -> Result<Self, JointsError> {
+        let source = source.into();
         let coupling = Coupling::new(spec);
         let (torque_limit, torque_rate_limit) = (spec.torque_limit, spec.torque_rate_limit);
         let lists = [
@@ -131,17 +122,17 @@ impl Haptics {
             spec.speed_limit,
         ];
         let lists = lists.map(|list| list.len());
-        let gains = lists.into_iter().find(|&len| len != field.joints()).unwrap_or(lists[0]);
-        if gains != field.joints() || npmi.joints() != field.joints() {
-            return Err(JointsError { field: field.joints(), proxy: npmi.joints(), gains });
+        let gains = lists.into_iter().find(|&len| len != source.joints()).unwrap_or(lists[0]);
+        if gains != source.joints() || npmi.joints() != source.joints() {
+            return Err(JointsError { field: source.joints(), proxy: npmi.joints(), gains });
         }
         let period = 1.0 / spec.rate;
         let watchdog = Watchdog::new(period, spec.speed_limit);
         let channels = spec.four_channel.map(|channels| Channels::new(channels, spec));
         let control = PassivityControl::new(spec);
         Ok(Self {
-            range: HaptizedRange::of_grid(field.grid()),
-            field,
+            range: HaptizedRange::of_grid(source.grid()),
+            source,
             npmi,
             coupling,
             channels,
@@ -175,13 +166,13 @@ impl Haptics {
     /// Number of joints d.
     #[must_use]
     pub fn joints(&self) -> usize {
-        self.field.joints()
+        self.source.joints()
     }
 
-    /// The contact field.
+    /// Where its contact torque comes from.
     #[must_use]
-    pub fn field(&self) -> &TorqueField {
-        &self.field
+    pub fn source(&self) -> &TorqueSource {
+        &self.source
     }
 
     /// Nominal time between two ticks T (s).
@@ -239,13 +230,14 @@ impl Haptics {
         }
     }
 
-    /// One tick.
+    /// One tick. Over a scene that is solved in every tick this makes room for that each time: a session has its own
+    /// ([`TorqueSource::begin`], [`Haptics::tick_with`]).
     pub fn tick(&self, state: &mut State, inputs: &Inputs) -> Output {
-        self.tick_with(state, inputs, &mut ContactSource::Dataset)
+        self.tick_with(state, inputs, &mut self.source.begin())
     }
 
-    /// One tick over the contact of `source`.
-    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, source: &mut ContactSource) -> Output {
+    /// One tick over `contact`, which the session has of this loop's source.
+    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, contact: &mut Contact<'_>) -> Output {
         let checked = self
             .watchdog
             .check(inputs, &state.device)
@@ -262,17 +254,16 @@ impl Haptics {
             state.accounts.device_moved(&self.coupling, inputs.elapsed, moved, &proxy, torque);
             state.device = inputs.position;
         }
-        let sample = match source {
-            ContactSource::Dataset => self.field.sample(&proxy),
-            ContactSource::Live(live) => live.sample(&self.field, &proxy, &state.accounts, self.period),
-            ContactSource::Recorded(sample) => *sample,
-        };
-        let stored = self.field.has_energy().then_some(sample.energy);
+        let (sample, age) = contact.sample(&proxy);
+        let stored = self.source.has_energy().then_some(sample.energy);
         let spring = self.coupling.spring_energy(&proxy, &state.device);
         state.accounts.at_tick(state.motion.kinetic_energy(), spring, stored, sample.index > 0.0);
         let accounts = state.accounts;
         if fault.is_none() && accounts.device_port().is_some_and(|port| port < -GREATEST_GIVEN_ENERGY) {
             fault = Some(Fault::Energy);
+        }
+        if fault.is_none() && f64::from(age) * self.period > GREATEST_POSITION_AGE {
+            fault = Some(Fault::Unsolved);
         }
 
         let mut wanted = JointVector::zeros(self.joints());
@@ -290,11 +281,7 @@ impl Haptics {
         state.held.push(&torque);
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
-        let solved = if let ContactSource::Live(live) = source { live.forces(&proxy) } else { &[] };
-        let stopped = self.move_proxy(state, interval, &velocity, &sample, solved);
-        if let ContactSource::Live(live) = source {
-            live.tell(&state.motion.position, &state.proxy_velocity);
-        }
+        let stopped = self.move_proxy(state, interval, &velocity, &sample, contact.forces());
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
     }
 

@@ -1,249 +1,167 @@
-//! Contact that is solved while it is felt: the loop's end of `sweep/ahead`.
+//! Contact that is solved in every tick: the law at rest, of a scene for which nothing was baked.
 //!
-//! The loop publishes where the proxy is and goes, and feels what is there: the equilibrium solved at the proxy and its
-//! tangent, if the scene asks for that (`direct`) and it comes in time; else the store, with the finest level that is
-//! there. What others publish meanwhile changes nothing within a tick: the store is read up to one
-//! [horizon](crate::store::Store::horizon). From tick to tick the torque passes over without a jump and without energy
-//! from nowhere (`passage.rs`).
-//!
-//! A store keeps no contact forces. Effects at contacts have those of the equilibrium solved at the proxy.
-//!
-//! Nothing here allocates, locks or waits: places and solutions go through triple buffers, of which each end has a
-//! value of its own.
+//! A tick has no time for more than [`LiveSolver`] bounds. Where contact is larger, or does not converge, the torque of
+//! the last tick that was solved is felt on, for as long as a torque may rest on a position
+//! ([`GREATEST_POSITION_AGE`](super::watchdog::GREATEST_POSITION_AGE)); then the loop fails
+//! ([`Fault::Unsolved`](super::flags::Fault::Unsolved)).
 
-use super::{accounts::Accounts, passage::Passage};
 use crate::{
-    JointVector, MAX_JOINTS,
-    contact::{NodeForce, Status},
-    field::{Flags, Sample, TorqueField},
-    store::{Store, space::MAX_LEVELS},
-    sweep::ahead::{Solution, Whereabouts},
+    JointMatrix, JointVector,
+    contact::{LiveContact, LiveSolver, Model, NodeForce, Solvers, Status},
+    dataset::{Axis, Dataset, Grid, Surface},
+    field::{Flags, Sample},
+    object::Object,
+    scene::{Algorithm, Scene},
+    sweep::{BakeError, CpuBackend, Direct, build_object, sample},
 };
-use serde::Serialize;
 
-/// Ticks after which a solution is late (1). More: the tangent is followed farther. Fewer: the store answers where the
-/// thread that solves was held up.
-const LATE: u64 = 8;
+/// Configurations at which the stiffness of the torque is looked at, spread over the grid (1). More: a steeper one is
+/// found between them, at a price of a tenth of a millisecond each.
+const STIFFNESS_SAMPLES: usize = 2048;
 
-/// Farthest way of a node of the proxy, by a bound, on which a tangent is followed (m): the second order errs by some
-/// percent of the force where the way is a tenth of the length over which a dent is rounded.
-const FARTHEST: f64 = 0.003;
+/// Lines of the grid along each joint (1): the region is all that is used of it.
+const LINES: usize = 3;
 
-/// Contact that is solved while it is felt.
-pub struct Live {
-    /// Levels that are wanted.
-    wanted: u32,
-    /// Greatest lever of each joint (m/rad or 1).
-    levers: JointVector,
-    whereabouts: Vec<triple_buffer::Input<Whereabouts>>,
-    /// Absent unless the scene asks for them.
-    solutions: Option<triple_buffer::Output<Solution>>,
-    followed: Followed,
-    tick: u64,
-    last: Option<Felt>,
-    passage: Passage,
-    answers: Answers,
-    published: triple_buffer::Input<Answers>,
+/// A scene that is solved in every tick. Sessions share it.
+pub struct LiveScene {
+    scene: Scene,
+    direct: Direct,
+    grid: Grid,
+    /// Tangents d tau/d q in contact, over the grid (N m/rad).
+    tangents: Vec<JointMatrix>,
+    follows: bool,
 }
 
-/// What the loop takes of the equilibrium at the proxy, as the scene asks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Followed {
-    /// Torque and tangent, which are felt in the place of the store's.
-    pub torque: bool,
-    /// Forces on the proxy's nodes, for effects at contacts.
-    pub forces: bool,
-}
-
-impl Followed {
-    /// Whether it is solved at all.
-    #[must_use]
-    pub fn is_solved(self) -> bool {
-        self.torque || self.forces
+impl LiveScene {
+    /// Prepares `scene` with the law at rest, whatever law it names.
+    ///
+    /// # Errors
+    /// When its object cannot be built, or its compliance cannot be formed.
+    pub fn new(scene: Scene) -> Result<Self, BakeError> {
+        let object = build_object(&scene)?;
+        Self::of(scene, object)
     }
-}
 
-/// The other ends of a [`Live`].
-pub struct LiveEnds {
-    /// Where the proxy is, one end for each thread that solves; the last one is that of `solutions`, if there is one.
-    pub whereabouts: Vec<triple_buffer::Output<Whereabouts>>,
-    /// Equilibria at the proxy.
-    pub solutions: Option<triple_buffer::Input<Solution>>,
-    /// The sources that answered the ticks so far.
-    pub answers: triple_buffer::Output<Answers>,
-}
+    /// The same with the `object` of the scene, which was built before.
+    ///
+    /// # Errors
+    /// When its compliance cannot be formed.
+    pub fn of(mut scene: Scene, object: Object) -> Result<Self, BakeError> {
+        let follows = scene.contact.algorithm != Algorithm::Rest;
+        scene.contact.algorithm = Algorithm::Rest;
+        let direct = Direct::of(&scene, object)?;
+        let grid = region(&scene);
+        let tangents = tangents(direct.model(), &sample(&scene));
+        Ok(Self { scene, direct, grid, tangents, follows })
+    }
 
-/// Count of answers by source.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Answers {
-    /// Ticks.
-    pub ticks: u64,
-    /// Those that followed a solution at the proxy.
-    pub direct: u64,
-    /// Those that the store answered by so many levels, from none on.
-    pub by_levels: [u64; MAX_LEVELS as usize + 1],
-    /// Those that the store answered by fewer levels than wanted.
-    pub coarser: u64,
-    /// Ticks among them in contact.
-    pub coarser_in_contact: u64,
-    /// Ticks at which the function had changed where the proxy was.
-    pub changes: u64,
-    /// Greatest change of the torque that was passed over, by joint (N m or N).
-    pub greatest_change: [f64; MAX_JOINTS],
-    /// Energy given by passing over, and taken (J).
-    pub given: f64,
-    /// (J)
-    pub taken: f64,
-}
+    /// The scene.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
 
-/// Last answer, before any passage.
-struct Felt {
-    place: JointVector,
-    torque: JointVector,
-    energy: f64,
-    /// Tells functions apart.
-    source: (bool, u64),
-}
+    /// Its object and its proxy, prepared.
+    #[must_use]
+    pub fn direct(&self) -> &Direct {
+        &self.direct
+    }
 
-/// The function that answers a tick.
-enum Source<'a> {
-    Store { field: &'a TorqueField, horizon: u64 },
-    Solution(&'a Solution),
-}
+    /// The region in which the proxy stays: the scene's grid, or where it has none the joints' limits.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
 
-impl Source<'_> {
-    fn id(&self) -> (bool, u64) {
-        match self {
-            Self::Store { horizon, .. } => (false, *horizon),
-            Self::Solution(solution) => (true, solution.number),
+    /// A dataset of its region in which nothing is stored.
+    #[must_use]
+    pub fn dataset(&self) -> Dataset {
+        let (grid, points) = (self.grid.clone(), self.grid.points());
+        let (torque, status) = (vec![0.0; points * grid.joints()], vec![Status::Outside as u8; points]);
+        Dataset {
+            surface: Some(Surface::of(self.direct.model().object)),
+            scene: self.scene.text.clone(),
+            provenance: CpuBackend::provenance(&self.scene),
+            ..Dataset::bare(grid, torque, status)
         }
     }
 
-    /// The field at `q`, and the levels of the store that were there.
-    fn at(&self, q: &JointVector) -> (Sample, u32) {
-        match self {
-            Self::Store { field, horizon } => field.sample_within(q, *horizon),
-            Self::Solution(solution) => {
-                let (torque, energy) = solution.at(q);
-                let contact = energy > 0.0;
-                let sample = Sample {
-                    torque,
-                    index: f64::from(u8::from(contact)),
-                    contact,
-                    contact_nodes: if contact { solution.contact_nodes } else { 0 },
-                    energy,
-                    share: 1.0,
-                    flags: Flags::empty(),
-                };
-                (sample, 0)
-            }
-        }
-    }
-}
-
-impl Live {
-    /// For a proxy that starts at `start`, with so many `levels` wanted and the greatest lever of each joint; `threads`
-    /// fill the store, and another one solves the equilibrium at the proxy, if anything of it is `followed`.
+    /// Returns what is felt other than the scene says, as a sentence without its full stop.
     #[must_use]
-    pub fn new(
-        start: &JointVector,
-        levels: u32,
-        levers: &JointVector,
-        threads: usize,
-        followed: Followed,
-    ) -> (Self, LiveEnds) {
-        let (joints, is_solved) = (start.len(), followed.is_solved());
-        let ends = || triple_buffer::triple_buffer(&Whereabouts::at_rest(start));
-        let (inputs, outputs) = (0..threads + usize::from(is_solved)).map(|_| ends()).unzip();
-        let (written, read) = triple_buffer::triple_buffer(&Solution::none(joints));
-        let (published, answers) = triple_buffer::triple_buffer(&Answers::default());
-        let live = Self {
-            wanted: levels,
-            levers: *levers,
-            whereabouts: inputs,
-            solutions: is_solved.then_some(read),
-            followed,
-            tick: 0,
-            last: None,
-            passage: Passage::new(joints),
-            answers: Answers::default(),
-            published,
+    pub fn notice(&self) -> Option<&'static str> {
+        self.follows.then_some(
+            "contact is solved live before the surface at rest, where the scene names a law that follows the \
+             deformation: in deep contact the two differ by some percent; bake the scene to feel its own",
+        )
+    }
+
+    /// Greatest stiffness of the torque relative to `slopes` that was seen at the configurations looked at, as
+    /// [`TorqueField::relative_stiffness`](crate::field::TorqueField::relative_stiffness) has it (1).
+    #[must_use]
+    pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
+        let relative = |tangent: &JointMatrix| {
+            let entry = |a: usize, b: usize| tangent[a][b].powi(2) / (slopes[a] * slopes[b]);
+            let rows = (0..slopes.len()).map(|a| (0..slopes.len()).map(|b| entry(a, b)).sum::<f64>());
+            rows.sum::<f64>().sqrt()
         };
-        (live, LiveEnds { whereabouts: outputs, solutions: is_solved.then_some(written), answers })
-    }
-
-    /// Whether it gives contact forces.
-    #[must_use]
-    pub fn solves_forces(&self) -> bool {
-        self.followed.forces
-    }
-
-    /// Forces on the proxy's nodes in the tick whose contact was sampled last, at `x`; none where no solution is good
-    /// (N).
-    pub(super) fn forces(&self, x: &JointVector) -> &[NodeForce] {
-        let solution = self.solutions.as_ref().map(triple_buffer::Output::peek_output_buffer);
-        match solution.filter(|solution| serves(solution, x, self.tick, &self.levers)) {
-            Some(solution) => &solution.on_proxy,
-            None => &[],
-        }
-    }
-
-    /// The contact field at `x` in a tick of `period` (s).
-    pub(super) fn sample(&mut self, field: &TorqueField, x: &JointVector, accounts: &Accounts, period: f64) -> Sample {
-        let Self { wanted, levers, solutions, followed, tick, last, passage, answers, .. } = self;
-        let horizon = field.store().map_or(0, Store::horizon);
-        let solution = solutions.as_mut().map(|solutions| solutions.read());
-        let source = match solution.filter(|solution| followed.torque && serves(solution, x, *tick, levers)) {
-            Some(solution) => Source::Solution(solution),
-            None => Source::Store { field, horizon },
-        };
-        let (mut sample, levels) = source.at(x);
-        if let Some(last) = last {
-            if last.source != source.id() {
-                let (now, _) = source.at(&last.place);
-                answers.changes += u64::from(last.torque != now.torque);
-                let changes = last.torque.iter().zip(now.torque.iter()).map(|(a, b)| (a - b).abs());
-                answers.greatest_change.iter_mut().zip(changes).for_each(|(most, change)| *most = most.max(change));
-                passage.take((&last.torque, last.energy), (&now.torque, now.energy));
-            }
-            passage.go(&last.place, x);
-        }
-        *last = Some(Felt { place: *x, torque: sample.torque, energy: sample.energy, source: source.id() });
-        let budget = accounts.first_stored.map_or(0.0, |first| {
-            accounts.taken_from_field() - (accounts.field_work + sample.energy + passage.energy() - first)
-        });
-        let given = passage.fade(period, budget);
-        answers.given += given.max(0.0);
-        answers.taken += (-given).max(0.0);
-        answers.ticks += 1;
-        match source {
-            Source::Solution(_) => answers.direct += 1,
-            Source::Store { .. } => {
-                answers.by_levels[levels as usize] += 1;
-                answers.coarser += u64::from(levels < *wanted);
-                answers.coarser_in_contact += u64::from(levels < *wanted && sample.contact);
-            }
-        }
-        sample.torque.iter_mut().zip(passage.torque().iter()).for_each(|(torque, rest)| *torque += rest);
-        sample.energy += passage.energy();
-        sample
-    }
-
-    /// Tells where the proxy is at the next tick, and how fast it goes.
-    pub(super) fn tell(&mut self, position: &JointVector, velocity: &JointVector) {
-        self.tick += 1;
-        let whereabouts = Whereabouts { position: *position, velocity: *velocity, tick: self.tick };
-        self.whereabouts.iter_mut().for_each(|end| end.write(whereabouts));
-        self.published.write(self.answers);
+        self.tangents.iter().map(relative).fold(0.0, f64::max)
     }
 }
 
-/// Whether `solution` is still good at `x` in tick `tick`.
-fn serves(solution: &Solution, x: &JointVector, tick: u64, levers: &JointVector) -> bool {
-    let ways =
-        x.iter().zip(solution.place.iter()).zip(levers.iter()).map(|((x, place), lever)| (x - place).abs() * lever);
-    solution.number > 0
-        && matches!(solution.status, Status::Free | Status::Contact)
-        && tick <= solution.tick + LATE
-        && ways.sum::<f64>() <= FARTHEST
+/// A grid of few lines over the region of the scene's, or where it has none over the joints' limits.
+fn region(scene: &Scene) -> Grid {
+    let axes = scene.proxy.joints.iter().enumerate().map(|(a, joint)| {
+        let ends = scene.grid.axes.get(a).map(|axis| [axis.start, axis.start + axis.step * (axis.count - 1) as f64]);
+        let [start, last] = ends.unwrap_or(joint.limits);
+        let step = (last - start) / (LINES - 1) as f64;
+        Axis { name: joint.name.clone(), unit: joint.kind.unit().into(), start, step, count: LINES }
+    });
+    Grid { axes: axes.collect() }
+}
+
+/// The tangents at some of `configurations`, spread over them, where there is contact.
+fn tangents(model: &Model<'_>, configurations: &[JointVector]) -> Vec<JointMatrix> {
+    let mut model = model.clone();
+    model.with_tangent = true;
+    let every = configurations.len().div_ceil(STIFFNESS_SAMPLES).max(1);
+    let some: Vec<JointVector> = configurations.iter().step_by(every).copied().collect();
+    let solvers = Solvers::new(&model, rayon::current_num_threads());
+    solvers.map(&some, |solver, q| solver.solve(q).tangent).into_iter().flatten().collect()
+}
+
+/// The contact of a [`LiveScene`] in one session.
+pub struct LiveSession<'a> {
+    solver: LiveSolver<'a>,
+    /// What was felt last, and how many ticks ago it was solved.
+    felt: Sample,
+    age: u32,
+}
+
+impl<'a> LiveSession<'a> {
+    /// Room for all that a session solves.
+    #[must_use]
+    pub fn new(scene: &'a LiveScene) -> Self {
+        let model = scene.direct.model();
+        let felt = Sample { torque: JointVector::zeros(model.chain.joints.len()), share: 1.0, ..Sample::default() };
+        Self { solver: LiveSolver::new(model), felt, age: 0 }
+    }
+
+    /// Contact at `q`, and how many ticks ago it was solved. Never allocates.
+    pub(super) fn sample(&mut self, q: &[f64]) -> (Sample, u32) {
+        let LiveContact { status, energy, torque, contact_nodes, .. } = self.solver.solve(q);
+        if matches!(status, Status::Free | Status::Contact) {
+            let contact = status == Status::Contact;
+            let (index, flags) = (f64::from(u8::from(contact)), Flags::empty());
+            (self.felt, self.age) = (Sample { torque, index, contact, contact_nodes, energy, share: 1.0, flags }, 0);
+        } else {
+            self.felt.flags = Flags::UNCONVERGED;
+            self.age += 1;
+        }
+        (self.felt, self.age)
+    }
+
+    /// Forces on the proxy's nodes where contact was sampled last (N).
+    pub(super) fn forces(&self) -> &[NodeForce] {
+        self.solver.on_proxy()
+    }
 }

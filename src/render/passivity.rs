@@ -2,7 +2,8 @@
 //! would do.
 //!
 //! - Boundary layer and object, per joint: `Ks <= mu bv / T` (section 3.1); by the discrete energy balance of the step
-//!   it is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the dataset's torque itself.
+//!   it is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the contact torque itself: of a dataset's a bound is known, of one that is
+//!   solved live the greatest of many.
 //!   Behind a boundary layer both act at right angles: the slope of what is rendered is at most the root of the sum of
 //!   their squares (`field/boundary.rs`), and is compared with the sharp bound 2 bv / T.
 //! - Device, per joint, against its own damping: Colgate's wall, `bd > K T/2 + |Bvc|`, with `K = Kvc`, and
@@ -11,7 +12,8 @@
 //! - Encoder, per joint, if its step Delta is given: `K <= 2 fc / Delta`, fc the device's dry friction (Diolaiti,
 //!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
-use crate::{JointVector, dataset::JointLabel, field::TorqueField, scene::HapticsSpec};
+use super::source::TorqueSource;
+use crate::{JointVector, dataset::JointLabel, scene::HapticsSpec};
 use serde::Serialize;
 
 /// A gain and its passivity bound. Beyond it the loop runs, and may create energy.
@@ -80,15 +82,15 @@ fn handed_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
     spec.four_channel.map_or(0.0, |channels| channels.channels[1] * spec.boundary_slope[joint])
 }
 
-/// Returns `spec` with its proxy damping bv raised as far as the slope Ks and the stiffness of `field` ask for;
+/// Returns `spec` with its proxy damping bv raised as far as the slope Ks and the stiffness of `source` ask for;
 /// unchanged where it is passive.
 #[must_use]
-pub fn damped(spec: &HapticsSpec, field: &TorqueField) -> HapticsSpec {
+pub fn damped(spec: &HapticsSpec, source: &TorqueSource) -> HapticsSpec {
     let mut damped = spec.clone();
     for (damping, slope) in damped.proxy_damping.iter_mut().zip(spec.boundary_slope.iter()) {
         *damping = damping.max(slope / (spec.rate * spec.passivity_factor));
     }
-    let [object, both] = relative_stiffness(&damped, field);
+    let [object, both] = relative_stiffness(&damped, source);
     let ratio = object.max(both);
     if ratio > 1.0 && ratio.is_finite() {
         damped.proxy_damping.iter_mut().for_each(|damping| *damping *= ratio * (1.0 + ROUNDING));
@@ -105,10 +107,10 @@ fn greatest_slopes(spec: &HapticsSpec) -> JointVector {
 
 /// Stiffness of the dataset's torque over mu bv / T, and that of boundary layer and object together over 2 bv / T, zero
 /// where there is no layer (1).
-fn relative_stiffness(spec: &HapticsSpec, field: &TorqueField) -> [f64; 2] {
+fn relative_stiffness(spec: &HapticsSpec, source: &TorqueSource) -> [f64; 2] {
     let slopes = greatest_slopes(spec);
-    let object = field.relative_stiffness(&slopes);
-    if field.is_potential() {
+    let object = source.relative_stiffness(&slopes);
+    if source.is_potential() {
         return [object, 0.0];
     }
     let layer = spec.boundary_slope.iter().zip(slopes.iter()).map(|(slope, safe)| slope / safe).fold(0.0, f64::max);
@@ -121,7 +123,7 @@ const ROUNDING: f64 = 1e-12;
 /// Returns what is wrong with the gains of `spec` in one sentence, and the values that would be passive in another;
 /// `None` where all bounds hold.
 #[must_use]
-pub fn advice(spec: &HapticsSpec, field: &TorqueField, bounds: &[Bound]) -> Option<String> {
+pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Option<String> {
     let exceeded = || bounds.iter().filter(|bound| bound.is_exceeded());
     let worst = exceeded().max_by(|a, b| (a.value / a.safe).total_cmp(&(b.value / b.safe)))?;
     let others = match exceeded().count() - 1 {
@@ -129,8 +131,8 @@ pub fn advice(spec: &HapticsSpec, field: &TorqueField, bounds: &[Bound]) -> Opti
         1 => ", and 1 gain more".into(),
         count => format!(", and {count} gains more"),
     };
-    let joints = field.joints();
-    let passive = damped(spec, field);
+    let joints = source.joints();
+    let passive = damped(spec, source);
     let mut remedies = Vec::new();
     if passive.proxy_damping != spec.proxy_damping {
         let damping = passive.proxy_damping.iter().zip(spec.proxy_damping.iter());
@@ -211,12 +213,12 @@ fn list(values: impl Iterator<Item = f64>) -> String {
     }
 }
 
-/// All bounds on the gains of `spec`, with `field` and the names of the joints.
+/// All bounds on the gains of `spec`, with `source` and the names of the joints.
 #[must_use]
-pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) -> Vec<Bound> {
+pub fn bounds(spec: &HapticsSpec, source: &TorqueSource, joints: &[JointLabel]) -> Vec<Bound> {
     let period = 1.0 / spec.rate;
     let mut found = Vec::new();
-    for (a, joint) in joints.iter().enumerate().take(field.joints()) {
+    for (a, joint) in joints.iter().enumerate().take(source.joints()) {
         let (torque, angle) = if joint.unit == "m" { ("N", "m") } else { ("N m", "rad") };
         let slope = greatest_slope(spec, a);
         found.push(Bound {
@@ -255,9 +257,9 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
         }
     }
     if greatest_slopes(spec).iter().all(|slope| *slope > 0.0) {
-        let [object, both] = relative_stiffness(spec, field);
+        let [object, both] = relative_stiffness(spec, source);
         found.push(Bound {
-            what: "stiffness of the dataset's torque over mu bv / T".into(),
+            what: "stiffness of the contact torque over mu bv / T".into(),
             value: object,
             safe: 1.0,
             remedy: format!(
@@ -265,7 +267,7 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
                 at_least(object)
             ),
         });
-        if !field.is_potential() {
+        if !source.is_potential() {
             found.push(Bound {
                 what: "stiffness of layer and object together over 2 bv / T".into(),
                 value: both,
@@ -279,6 +281,6 @@ pub fn bounds(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) ->
 
 /// The bounds that are exceeded.
 #[must_use]
-pub fn exceeded(spec: &HapticsSpec, field: &TorqueField, joints: &[JointLabel]) -> Vec<Bound> {
-    bounds(spec, field, joints).into_iter().filter(Bound::is_exceeded).collect()
+pub fn exceeded(spec: &HapticsSpec, source: &TorqueSource, joints: &[JointLabel]) -> Vec<Bound> {
+    bounds(spec, source, joints).into_iter().filter(Bound::is_exceeded).collect()
 }

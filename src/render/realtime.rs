@@ -7,7 +7,6 @@
 use super::{
     graphics::Graphics,
     haptic::Haptics,
-    live::Live,
     session::{Driver, Frames, Latest, Plan, SessionError},
     timing::{Durations, Percentiles, Timing},
     trace::{Tick, Trace},
@@ -70,13 +69,11 @@ impl Recorder {
     }
 }
 
-/// What a session against the clock is run with. By default nothing ends it early, its dataset does not change, and
-/// nobody looks at its ticks before the end.
+/// What a session against the clock is run with. By default nothing ends it early, and nobody looks at its ticks before
+/// the end.
 pub struct Options<'a> {
     /// Ends the session when it is raised.
     pub stop: &'a AtomicBool,
-    /// Contact that is solved meanwhile.
-    pub live: Option<Live>,
     /// Called with each tick soon after it, in the order of time; not in the real-time thread. Up to sixteen seconds of
     /// ticks wait for a call that takes long.
     pub on_tick: Option<&'a mut dyn FnMut(&Tick)>,
@@ -85,7 +82,7 @@ pub struct Options<'a> {
 impl Default for Options<'_> {
     fn default() -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
-        Self { stop: &NEVER, live: None, on_tick: None }
+        Self { stop: &NEVER, on_tick: None }
     }
 }
 
@@ -101,11 +98,10 @@ pub fn run(
     plan: &Plan,
     options: Options<'_>,
 ) -> Result<(Trace, Timing), SessionError> {
-    let Options { stop, live, mut on_tick } = options;
-    let solved_meanwhile = live.is_some();
+    let Options { stop, mut on_tick } = options;
     let goes_on = || (!stop.load(Ordering::Relaxed)).then_some(Patience::Spins);
     let clock = Clock::of(device, haptics.period(), RATE, &goes_on)?;
-    let mut driver = Driver::new(haptics, device, live)?;
+    let mut driver = Driver::new(haptics, device)?;
     let (mut recorder, Ends { ticks, latest }) = Recorder::new(haptics.joints());
     let start = *driver.start();
     let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
@@ -147,7 +143,7 @@ pub fn run(
             (frames, timing.frame_cost, timing.missed_frames) = (drawn.frames.kept(), drawn.cost, drawn.missed);
         }
         let joints = plan.joints.clone();
-        Ok((Trace { joints, start, ticks: recorded, frames, solved_meanwhile }, timing))
+        Ok((Trace { joints, start, ticks: recorded, frames }, timing))
     })
 }
 

@@ -6,12 +6,11 @@
 //! kept; a header; one row a tick, of the columns in `columns.rs`. `elapsed`, `interval`, `age` and position are the
 //! tick's inputs as in [`Inputs`](super::haptic::Inputs); `restart` is 1 where a fault was cleared; `frames` is how many
 //! frames of the object showed this tick; torque and proxy are the answer, `held` is what the device held of the torque
-//! (as much as was asked for where a file has no such columns). Where contact was solved meanwhile, the contact that was
-//! felt follows, and a replay feels it again: another time other solutions come in time. Numbers are printed so that
-//! reading gives the same bits. A position of a wrong number of joints has empty fields.
+//! (as much as was asked for where a file has no such columns). Numbers are printed so that reading gives the same bits.
+//! A position of a wrong number of joints has empty fields.
 
 use super::{
-    columns::{FELT, RECORDED, head, number, read, read_vector, width, write, write_vector},
+    columns::{RECORDED, head, number, read, read_vector, width, write, write_vector},
     graphics::Graphics,
     haptic::Haptics,
     session::{Driver, Frames, HapticController, Latest, Plan, SessionError, collect},
@@ -36,8 +35,6 @@ pub struct Recording {
     start: JointVector,
     /// When the frames that were kept were drawn (s).
     kept: Vec<f64>,
-    /// Whether contact was solved meanwhile.
-    solved_meanwhile: bool,
     ticks: Vec<Tick>,
 }
 
@@ -72,13 +69,10 @@ impl Recording {
         write_vector(&trace.start, joints, table.field(START)?)?;
         table.end()?;
         table.field(KEPT)?.fields(trace.frames.iter().map(|frame| frame.time))?.end()?;
-        let felt = if trace.solved_meanwhile { FELT } else { &[] };
         head(RECORDED, &trace.joints, &mut table)?;
-        head(felt, &trace.joints, &mut table)?;
         table.end()?;
         for tick in &trace.ticks {
             write(RECORDED, *tick, joints, &mut table)?;
-            write(felt, *tick, joints, &mut table)?;
             table.end()?;
         }
         Ok(())
@@ -111,12 +105,7 @@ impl Recording {
             } else if !header && text.starts_with("elapsed") {
                 header = true;
             } else {
-                let (tick, solved_meanwhile) = row(text, joints).map_err(bad)?;
-                if solved_meanwhile != recording.solved_meanwhile && !recording.ticks.is_empty() {
-                    return Err(bad("another number of fields than above".into()));
-                }
-                recording.solved_meanwhile = solved_meanwhile;
-                recording.ticks.push(tick);
+                recording.ticks.push(row(text, joints).map_err(bad)?);
             }
         }
         if recording.start.len() != joints || recording.ticks.is_empty() {
@@ -139,16 +128,13 @@ impl Recording {
         joints: Vec<JointLabel>,
     ) -> Result<Trace, SessionError> {
         let mut device = Playback { recording: self, next: None };
-        let mut driver = Driver::new(haptics, &mut device, None)?;
+        let mut driver = Driver::new(haptics, &mut device)?;
         let plan = Plan { joints, ticks: self.ticks.len(), snapshots: self.kept.clone() };
         let mut times = self.ticks.iter().map(|tick| (tick.inputs.elapsed, tick.inputs.interval));
         // What befell the loop beside the device's readings befalls it again.
         let befall = |controller: &mut HapticController<'_>, tick: &Tick| {
             if tick.restart {
                 controller.clear().ask();
-            }
-            if self.solved_meanwhile {
-                controller.feel(tick.sample);
             }
         };
         let mut recorded = self.ticks.iter();
@@ -166,8 +152,7 @@ impl Recording {
             next.into_iter().for_each(|next| befall(controller, next));
         };
         let (ticks, frames) = collect(driver, Clock::Recorded(&mut times), graphics, &plan, each)?;
-        let (joints, solved_meanwhile) = (plan.joints, self.solved_meanwhile);
-        Ok(Trace { joints, start: self.start, ticks, frames, solved_meanwhile })
+        Ok(Trace { joints: plan.joints, start: self.start, ticks, frames })
     }
 
     /// Number of the first tick of `trace` whose torque or proxy is not that of the recording, to the last bit; none
@@ -208,12 +193,12 @@ impl Device for Playback<'_> {
     }
 }
 
-/// The tick of a row of `text`, and whether contact was solved meanwhile.
-fn row(text: &str, joints: usize) -> Result<(Tick, bool), String> {
+/// The tick of a row of `text`.
+fn row(text: &str, joints: usize) -> Result<Tick, String> {
     let (fields, mut tick) = (text.split(',').collect::<Vec<_>>(), Tick::default());
-    let (whole, felt) = (width(RECORDED, joints), width(FELT, joints));
-    let (solved_meanwhile, without_held) = (fields.len() == whole + felt, fields.len() + joints == whole);
-    if fields.len() != whole && !solved_meanwhile && !without_held {
+    let whole = width(RECORDED, joints);
+    let without_held = fields.len() + joints == whole;
+    if fields.len() != whole && !without_held {
         return Err(format!("{} fields in the place of {whole}", fields.len()));
     }
     let known = &RECORDED[..RECORDED.len() - usize::from(without_held)];
@@ -221,11 +206,8 @@ fn row(text: &str, joints: usize) -> Result<(Tick, bool), String> {
     if without_held {
         tick.applied.torque = tick.device_torque;
     }
-    if solved_meanwhile {
-        read(FELT, &fields[whole..], joints, &mut tick)?;
-    }
     if tick.frames > MAX_FRAMES {
         return Err(format!("{} frames in one tick, more than {MAX_FRAMES}", tick.frames));
     }
-    Ok((tick, solved_meanwhile))
+    Ok(tick)
 }

@@ -6,11 +6,10 @@
 //! first tick at or after `j T_g`, from the proxy's configuration then.
 
 use super::{
-    effects::ContactEffects,
     flags::Fault,
     graphics::{Graphics, GraphicsError},
-    haptic::{ContactSource, Haptics, Inputs, State},
-    live::Live,
+    haptic::{Haptics, Inputs, State},
+    source::Contact,
     trace::{Frame, Tick, Trace},
 };
 use crate::{
@@ -18,7 +17,6 @@ use crate::{
     control::{Clock, ClockError, ControlLoop, Controller},
     dataset::JointLabel,
     device::{Applied, Device, Reading},
-    field::Sample,
     memory,
 };
 use std::sync::{
@@ -44,9 +42,6 @@ pub enum SessionError {
     /// The device's first position is none.
     #[error("the session cannot start: {0}")]
     Start(#[from] Fault),
-    /// An effect needs contact forces that are solved meanwhile, and nobody solves them.
-    #[error("the session cannot start: friction and contact damping need contact forces, and nobody solves them")]
-    NoForces,
     /// There is no clock.
     #[error("the session cannot start: {0}")]
     Clock(#[from] ClockError),
@@ -78,7 +73,7 @@ pub struct Latest {
 pub struct HapticController<'session> {
     haptics: &'session Haptics,
     state: State,
-    source: ContactSource,
+    contact: Contact<'session>,
     start: JointVector,
     /// The tick that is under way, or was the last; none before the first.
     tick: Option<(Tick, Latest)>,
@@ -122,24 +117,15 @@ impl Plan {
 }
 
 impl<'session> Driver<'session> {
-    /// Reads the device and puts the proxy there, at rest; with `live` over contact that is solved meanwhile.
+    /// Reads the device and puts the proxy there, at rest.
     ///
     /// # Errors
-    /// When the device reports no position, or contact forces are needed that nobody gives.
-    pub fn new(
-        haptics: &'session Haptics,
-        device: &'session mut dyn Device,
-        live: Option<Live>,
-    ) -> Result<Self, SessionError> {
-        let are_solved = live.as_ref().is_some_and(Live::solves_forces);
-        if haptics.effects().is_some_and(ContactEffects::need_solved_forces) && !are_solved {
-            return Err(SessionError::NoForces);
-        }
+    /// When the device reports no position.
+    pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<Self, SessionError> {
         let start = device.read(0.0).position;
         let state = haptics.start(&start)?;
-        let source = live.map_or(ContactSource::Dataset, |live| ContactSource::Live(Box::new(live)));
-        let clear = ClearFault::default();
-        Ok(Self::of(HapticController { haptics, state, source, start, tick: None, clear }, device))
+        let (contact, clear) = (haptics.source().begin(), ClearFault::default());
+        Ok(Self::of(HapticController { haptics, state, contact, start, tick: None, clear }, device))
     }
 
     /// Asks for a fault to be cleared at the next tick: the loop then starts again where the device is. Nothing happens
@@ -156,11 +142,6 @@ impl<'session> Driver<'session> {
 }
 
 impl HapticController<'_> {
-    /// Has the next tick feel the contact of `sample`.
-    pub(super) fn feel(&mut self, sample: Sample) {
-        self.source = ContactSource::Recorded(sample);
-    }
-
     /// What clears its fault.
     #[must_use]
     pub fn clear(&self) -> ClearFault {
@@ -182,7 +163,7 @@ impl Controller for HapticController<'_> {
             && self.state.fault().is_some()
             && self.haptics.restart(&mut self.state, &reading.position).is_ok();
         let inputs = Inputs { position: reading.position, age: reading.age, elapsed, interval };
-        let output = self.haptics.tick_with(&mut self.state, &inputs, &mut self.source);
+        let output = self.haptics.tick_with(&mut self.state, &inputs, &mut self.contact);
         let tick = Tick {
             time,
             inputs,
@@ -272,7 +253,7 @@ pub fn run(
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
 ) -> Result<Trace, SessionError> {
-    let (driver, period) = (Driver::new(haptics, device, None)?, haptics.period());
+    let (driver, period) = (Driver::new(haptics, device)?, haptics.period());
     let start = *driver.start();
     let as_due =
         |_: &mut HapticController<'_>, tick: &mut Tick, frames: Option<&mut Frames<'_, '_>>, latest: &Latest| {
@@ -284,7 +265,7 @@ pub fn run(
             }
         };
     let (ticks, frames) = collect(driver, Clock::Steps(period), graphics, plan, as_due)?;
-    Ok(Trace { joints: plan.joints.clone(), start, ticks, frames, solved_meanwhile: false })
+    Ok(Trace { joints: plan.joints.clone(), start, ticks, frames })
 }
 
 /// Runs `driver` by `clock` for the ticks of `plan`, and calls `each` after each of them. Returns all ticks, and the

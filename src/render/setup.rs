@@ -1,14 +1,16 @@
 //! Everything that a dataset's rendering needs, built from the dataset alone: its scene's text gives chain and gains,
-//! its surface the object.
+//! its surface the object. A scene that is solved live is rendered like a dataset in which nothing is stored.
 
 use super::{
     effects::{ContactEffects, EffectError},
     graphics::{ContactForces, Graphics, GraphicsError},
     haptic::{Haptics, JointsError},
+    live::LiveScene,
     npmi::{InertiaError, Npmi},
     own_motion,
     passivity::{self, Bound},
     session::Plan,
+    source::TorqueSource,
 };
 use crate::{
     JointVector,
@@ -39,7 +41,8 @@ pub struct Setup {
     pub advice: Option<String>,
     /// The motions that the scene does not name, made from the dataset's own contact.
     pub made_motions: Vec<&'static str>,
-    explored: bool,
+    /// The scene, where it is solved live.
+    live: Option<Arc<LiveScene>>,
 }
 
 /// A dataset cannot be rendered.
@@ -98,19 +101,18 @@ impl Setup {
     /// # Errors
     /// When the dataset has no valid scene, or its parts do not fit.
     pub fn new(dataset: &Dataset) -> Result<Self, SetupError> {
-        Self::of(dataset, false)
+        Self::of(dataset, None)
     }
 
-    /// The same for a dataset that is explored while it is felt: effects at contacts act by the forces that a
-    /// [`Live`](super::live::Live) gives.
+    /// The same for a scene that is solved in every tick, and its [dataset](LiveScene::dataset).
     ///
     /// # Errors
     /// As [`Setup::new`].
-    pub fn explored(dataset: &Dataset) -> Result<Self, SetupError> {
-        Self::of(dataset, true)
+    pub fn live(scene: Arc<LiveScene>, dataset: &Dataset) -> Result<Self, SetupError> {
+        Self::of(dataset, Some(scene))
     }
 
-    fn of(dataset: &Dataset, explored: bool) -> Result<Self, SetupError> {
+    fn of(dataset: &Dataset, live: Option<Arc<LiveScene>>) -> Result<Self, SetupError> {
         if dataset.scene.trim().is_empty() {
             return Err(SetupError::NoScene);
         }
@@ -122,19 +124,21 @@ impl Setup {
         }
         dataset.check_scene().map_err(SetupError::Contradiction)?;
         let made_motions = own_motion::add(&mut scene, dataset);
-        let Loop { haptics, bounds, gains, advice } = haptic_loop(dataset, &chain, &scene, &scene.haptics, explored)?;
+        let Loop { haptics, bounds, gains, advice } =
+            haptic_loop(dataset, &chain, &scene, &scene.haptics, live.as_ref())?;
         // From here on the gains are as any others.
         scene.haptics = HapticsSpec { proxy_damping_is_free: false, ..gains };
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
+        let is_known = live.is_some() || ContactForces::known(dataset);
         let object = match (&scene.object, &scene.graphics, &dataset.surface) {
-            (Some(object), Some(_), Some(surface)) if ContactForces::known(dataset) => Some(surface.object(object)?),
+            (Some(object), Some(_), Some(surface)) if is_known => Some(surface.object(object)?),
             _ => match scene.graphics.and_then(|graphics| graphics.effects.named()) {
                 Some(effect) => return Err(SetupError::NothingDrawn(effect)),
                 None => None,
             },
         };
         let haptics = Arc::new(haptics);
-        Ok(Self { scene, chain, haptics, object, bounds, exceeded, advice, made_motions, explored })
+        Ok(Self { scene, chain, haptics, object, bounds, exceeded, advice, made_motions, live })
     }
 
     /// Returns the haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and
@@ -143,7 +147,8 @@ impl Setup {
     /// # Errors
     /// When they do not make a loop.
     pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<String>), SetupError> {
-        let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, self.explored)?;
+        let live = self.live.as_ref();
+        let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, live)?;
         Ok((haptics, advice))
     }
 
@@ -160,10 +165,22 @@ impl Setup {
     /// # Errors
     /// When the dataset's contact forces do not fit the object.
     pub fn graphics(&self, dataset: &Dataset) -> Result<Option<Graphics<'_>>, SetupError> {
-        match (&self.object, &self.scene.graphics) {
-            (Some(object), Some(graphics)) => Ok(Some(Graphics::new(dataset, object, graphics)?)),
+        match (&self.object, &self.scene.graphics, self.contact_forces(dataset)?) {
+            (Some(object), Some(graphics), Some(forces)) => Ok(Some(Graphics::new(forces, object, graphics)?)),
             _ => Ok(None),
         }
+    }
+
+    /// The contact forces on the object that is drawn; absent where there is none.
+    ///
+    /// # Errors
+    /// When the dataset's do not fit the object.
+    pub fn contact_forces(&self, dataset: &Dataset) -> Result<Option<ContactForces>, SetupError> {
+        let Some(object) = &self.object else { return Ok(None) };
+        Ok(Some(match &self.live {
+            Some(scene) => ContactForces::live(Arc::clone(scene)),
+            None => ContactForces::new(dataset, object.rest.len())?,
+        }))
     }
 
     /// A session of `seconds`, with `snapshots` shapes of the object spread evenly over it.
@@ -203,16 +220,24 @@ struct Loop {
     advice: Option<String>,
 }
 
-/// Makes the haptic loop over `dataset`, with `gains` in the place of those of its `scene`; see [`Setup::explored`].
+/// Makes the haptic loop over `dataset`, or the scene that is solved `live`, with `gains` in the place of those of its
+/// `scene`.
 fn haptic_loop(
     dataset: &Dataset,
     chain: &Chain,
     scene: &Rendering,
     gains: &HapticsSpec,
-    explored: bool,
+    live: Option<&Arc<LiveScene>>,
 ) -> Result<Loop, SetupError> {
-    let field = TorqueField::interpolated(dataset, gains.interpolation, gains.threshold, &gains.boundary_slope)?;
-    let gains = if gains.proxy_damping_is_free { passivity::damped(gains, &field) } else { gains.clone() };
+    let (source, range) = match live {
+        Some(scene) => (TorqueSource::Live(Arc::clone(scene)), HaptizedRange::of_grid(scene.grid())),
+        None => {
+            let HapticsSpec { interpolation, threshold, boundary_slope, .. } = gains;
+            let field = TorqueField::interpolated(dataset, *interpolation, *threshold, boundary_slope)?;
+            (field.into(), HaptizedRange::new(dataset, chain)?)
+        }
+    };
+    let gains = if gains.proxy_damping_is_free { passivity::damped(gains, &source) } else { gains.clone() };
     let npmi = match gains.proxy_inertia {
         ProxyInertia::Configuration => Npmi::of_chain(chain)?,
         ProxyInertia::Constant => {
@@ -222,11 +247,10 @@ fn haptic_loop(
             Npmi::new(&chain.inertia(&pose), &limits)?
         }
     };
-    let bounds = passivity::bounds(&gains, &field, &labels(&dataset.grid));
-    let advice = passivity::advice(&gains, &field, &bounds);
-    let effects = ContactEffects::new(&gains, (dataset, explored), chain, &scene.text, &scene.path)?;
-    let range = HaptizedRange::new(dataset, chain)?;
-    let haptics = Haptics::new(field, npmi, &gains)?.with_range(range).with_effects(effects);
+    let bounds = passivity::bounds(&gains, &source, &labels(&dataset.grid));
+    let advice = passivity::advice(&gains, &source, &bounds);
+    let effects = ContactEffects::new(&gains, (dataset, live.is_some()), chain, &scene.text, &scene.path)?;
+    let haptics = Haptics::new(source, npmi, &gains)?.with_range(range).with_effects(effects);
     Ok(Loop { haptics, bounds, gains, advice })
 }
 

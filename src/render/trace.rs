@@ -70,8 +70,6 @@ pub struct Trace {
     pub ticks: Vec<Tick>,
     /// Ascending in time; empty without graphics.
     pub frames: Vec<Frame>,
-    /// Whether contact was solved meanwhile: what was felt is then nowhere but here.
-    pub solved_meanwhile: bool,
 }
 
 /// Key figures of a session. Sizes of torques are norms over the joints that turn, those of forces over the joints that
@@ -121,7 +119,7 @@ pub struct Summary {
     pub held: usize,
     /// Ticks with the proxy beside an absent grid point.
     pub absent: usize,
-    /// Ticks with the proxy beside an unconverged grid point.
+    /// Ticks with the proxy beside an unconverged grid point, or for which contact was not solved in time.
     pub unconverged: usize,
     /// Ticks with the torque on the device limited in size or rate.
     pub limited: usize,

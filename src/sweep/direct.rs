@@ -1,7 +1,7 @@
 //! Equilibria solved directly, wherever they are asked for: what a program calls that has no dataset, or wants to check
 //! one.
 
-use super::{BakeError, Inspection, sample};
+use super::{BakeError, Inspection, build_object, sample};
 use crate::{
     contact::{Model, Solvers, Status},
     field::{BatchError, check_rows},
@@ -52,7 +52,15 @@ impl Direct {
     /// # Errors
     /// When the object cannot be built.
     pub fn new(scene: &Scene) -> Result<Self, BakeError> {
-        let parts = Parts { object: Object::build(&scene.object)?, chain: Chain::new(&scene.proxy) };
+        Self::of(scene, build_object(scene)?)
+    }
+
+    /// The same with the `object` of the scene, which was built before.
+    ///
+    /// # Errors
+    /// When its compliance cannot be formed.
+    pub fn of(scene: &Scene, object: Object) -> Result<Self, BakeError> {
+        let parts = Parts { object, chain: Chain::new(&scene.proxy) };
         let prepared = Prepared::try_new(parts, |Parts { object, chain }| {
             Model::reaching(object, chain, scene.contact, &sample(scene))
         })?;

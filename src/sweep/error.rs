@@ -112,7 +112,7 @@ pub enum SweepError {
     },
     /// Another process writes the part.
     #[error(
-        "{path}: another process is writing this file, a bake or a session on demand: wait for it, then continue a bake by --resume, or choose another output"
+        "{path}: another process is writing this file: wait for it, then continue a bake by --resume, or choose another output"
     )]
     Busy {
         /// The part.

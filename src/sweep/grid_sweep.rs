@@ -458,7 +458,7 @@ pub(super) fn check_given(scene: &Scene) -> Result<(), SweepError> {
     if scene.grid.axes.is_empty() { Err(SweepError::NoGrid) } else { Ok(()) }
 }
 
-/// Checks that no session on demand keeps the file `output`: it would be lost, or the dataset written over.
+/// Checks that no other process writes the file `output`: it would be lost, or the dataset written over.
 fn check_unclaimed(output: &Path) -> Result<(), SweepError> {
     // Where nobody can claim it nobody can write it either, which is told by who tries.
     if matches!(Claim::new(output), Ok(None)) { Err(SweepError::Busy { path: output.into() }) } else { Ok(()) }

@@ -1,6 +1,5 @@
 //! Sweeps: a virtual object haptized over a grid in C-space.
 
-pub mod ahead;
 mod assembly;
 mod bake;
 mod choice;

@@ -94,17 +94,6 @@ impl Scale {
         let reach = reaches.fold(0.0, f64::max);
         Self { steps, reach, kc: model.kc }
     }
-
-    /// No node of the proxy moves farther when each joint moves by the spacing of `level` (m).
-    pub fn reach(&self, level: u32) -> f64 {
-        self.reach * 0.5_f64.powi(level as i32)
-    }
-}
-
-/// Solves the node at `q`.
-pub(super) fn solve(solver: &mut Solver<'_>, q: &JointVector, scale: &Scale) -> Solved {
-    let here = solver.solve(q);
-    holding(solver, q, &here, scale)
 }
 
 /// Returns the node at `q` that holds the equilibrium `here`.
@@ -114,7 +103,7 @@ pub(super) fn holding(solver: &mut Solver<'_>, q: &JointVector, here: &Equilibri
     begun.conclude(q, here, behind.as_ref(), scale)
 }
 
-/// Solves the nodes at `configurations` together, as [`solve`] does one: contact by `backend`, the searches for the
+/// Solves the nodes at `configurations` together: contact by `backend`, the searches for the
 /// boundary by `solvers`. Returns each with its equilibrium, without touches. `batch` is a good number of
 /// configurations for one call of the backend; `note` takes its notices, each with the number of the first node for
 /// which it holds.

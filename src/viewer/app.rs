@@ -15,7 +15,7 @@ use crate::{
     JointVector,
     gpu::{Context, GpuError},
     input,
-    render::{on_demand::OnDemand, timing::Timing},
+    render::timing::Timing,
     scene::Scene,
 };
 use eframe::{egui, egui_wgpu::RenderState};
@@ -29,10 +29,8 @@ use std::{
 pub enum Start {
     /// The paper's sphere, baked.
     Sphere,
-    /// A scene or a dataset.
+    /// A scene, which is solved live, or a dataset.
     File(PathBuf),
-    /// A scene that is solved while it is felt.
-    OnDemand(Arc<OnDemand>),
 }
 
 impl Start {
@@ -157,7 +155,6 @@ impl Viewer {
                 Err(error) => self.error = Some(error.to_string()),
             },
             Start::File(path) => self.open_file(path, egui),
-            Start::OnDemand(on_demand) => self.begin(Task::OnDemand(Arc::clone(on_demand)), egui),
         }
     }
 
@@ -307,7 +304,6 @@ impl Viewer {
             let egui = egui.clone();
             move || egui.request_repaint()
         };
-        session.show_explored(wake());
         let redrawn = self.scene.follow(&session.loaded, &session.controls.tuning.graphics, wake()).map_err(not_drawn);
         self.error = redrawn.and_then(|()| session.follow(wake())).err().or(self.error.take());
         session.feel.step((elapsed / session.loaded.setup.haptics.period()).round() as usize);

@@ -117,14 +117,14 @@ fn extremes(loaded: &Loaded) -> [f64; 2] {
 }
 
 /// The configuration of the motions, or else of the whole dataset, at which the energy is greatest, or the torque.
-/// Where a dataset is only being made, that with the greatest forces.
+/// Where contact is solved live, that with the greatest forces.
 fn deepest(loaded: &Loaded) -> Option<JointVector> {
     let dataset = &loaded.dataset;
     let motions = loaded.motions();
     let instants = motions.iter().flat_map(|(_, motion)| {
         (0..INSTANTS).map(|k| motion.at(motion.duration() * k as f64 / (INSTANTS - 1) as f64).0)
     });
-    if let (Some(_), Some(forces), Some(object)) = (&loaded.on_demand, &loaded.forces, &loaded.setup.object) {
+    if let (Some(_), Some(forces), Some(object)) = (&loaded.live, &loaded.forces, &loaded.setup.object) {
         let mut acting = vec![DVec3::ZERO; object.rest.len()];
         let mut total = |q: &JointVector| {
             forces.at(q, 1.0, &mut acting);

@@ -72,11 +72,6 @@ impl Cloud {
         Self { camera: home(), points: None, pitch: pitch(contact().count() / others, axes.len().min(3)), high }
     }
 
-    /// Shows `dataset` in the place of the one before, from where it was seen.
-    pub fn show_anew(&mut self, dataset: &Dataset) {
-        *self = Self { camera: self.camera, ..Self::new(dataset) };
-    }
-
     /// Shows it in a picture `height` points high.
     pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, height: f32) {
         let dataset = &loaded.dataset;

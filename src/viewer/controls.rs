@@ -150,8 +150,8 @@ impl Controls {
     fn haptization(&mut self, ui: &mut Ui, loaded: &Loaded, solvers: &[Solver]) -> bool {
         let provenance = &loaded.dataset.provenance;
         let by = if provenance.adapter.is_empty() { &provenance.backend } else { &provenance.adapter };
-        let points = match &loaded.on_demand {
-            Some(_) => "solved while it is felt".into(),
+        let points = match &loaded.live {
+            Some(_) => "solved live".into(),
             None => format!("{} points", loaded.dataset.grid.points()),
         };
         note(ui, format!("{points}, {} on {by}", provenance.algorithm));
@@ -234,7 +234,10 @@ fn note(ui: &mut Ui, text: String) -> Response {
 /// What `interpolation` needs and is not `loaded`, in words.
 fn lacking(interpolation: Interpolation, loaded: &Loaded) -> Option<&'static str> {
     match interpolation {
-        Interpolation::Direct if loaded.on_demand.is_none() => Some("Nothing is solved here: start with --on-demand"),
+        Interpolation::Direct if loaded.live.is_none() => Some("A dataset is interpolated: open the scene itself"),
+        Interpolation::Linear | Interpolation::Potential if loaded.live.is_some() => {
+            Some("Contact is solved in every tick: haptize the scene first")
+        }
         of if of.is_potential() && loaded.dataset.energy.is_none() => Some("This dataset holds no energy"),
         _ => None,
     }

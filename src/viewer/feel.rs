@@ -11,8 +11,6 @@ use crate::{
     device::{Device, Pointer, PointerInput},
     render::{
         haptic::Haptics,
-        live::{Answers, Live},
-        on_demand::{Exploration, OnDemand},
         realtime::{Ends, RATE, Recorder},
         session::{ClearFault, Driver, Latest, SessionError},
         trace::Tick,
@@ -51,7 +49,6 @@ pub struct Feel {
     refused: mpsc::Receiver<Vec<String>>,
     returned: mpsc::Receiver<Box<dyn Device>>,
     threads: Vec<JoinHandle<()>>,
-    exploration: Option<Exploration>,
     /// Whether every tick is waited for, even while the hand is still.
     keeps_pace: Arc<AtomicBool>,
 }
@@ -75,8 +72,6 @@ struct Body {
     device: Box<dyn Device>,
     /// Takes what ticks cost.
     cost: rtrb::Producer<Duration>,
-    /// The contact that is solved meanwhile.
-    live: Option<Live>,
     stop: Arc<AtomicBool>,
     /// Whether the device is the simulated one that is led, which may wait a little longer.
     is_led: bool,
@@ -123,8 +118,7 @@ impl Steps {
 }
 
 impl Feel {
-    /// Starts the loop with `device`; without one, with a simulated one that is held where `guide` leads it. Contact is
-    /// solved meanwhile where it is `on_demand`.
+    /// Starts the loop with `device`; without one, with a simulated one that is held where `guide` leads it.
     ///
     /// # Errors
     /// In words, when device and loop do not fit or the system gives no threads.
@@ -134,9 +128,8 @@ impl Feel {
         guide: Guide,
         pace: TickSource,
         device: Option<Box<dyn Device>>,
-        on_demand: Option<&Arc<OnDemand>>,
     ) -> Result<Self, String> {
-        let (mut device, input): (Box<dyn Device>, _) = match device {
+        let (device, input): (Box<dyn Device>, _) = match device {
             Some(device) => (device, None),
             None => {
                 let (pointer, input) = Pointer::new(gains, &guide.goal()).map_err(|error| error.to_string())?;
@@ -144,15 +137,13 @@ impl Feel {
             }
         };
         let is_led = input.is_some();
-        let explored = on_demand.map(|on_demand| explore(on_demand, &haptics, gains, device.as_mut())).transpose()?;
-        let (live, exploration) = explored.unzip();
         let guide = Arc::new(Mutex::new(guide));
         let stop = Arc::new(AtomicBool::new(false));
         let (cost, costs) = rtrb::RingBuffer::new(RING);
         let (give_back, returned) = mpsc::channel();
         let [is_still, keeps_pace] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
         let (still, pace_is_kept) = (Arc::clone(&is_still), Arc::clone(&keeps_pace));
-        let body = Body { haptics, device, cost, live, stop: Arc::clone(&stop), is_led, is_still, give_back };
+        let body = Body { haptics, device, cost, stop: Arc::clone(&stop), is_led, is_still, give_back };
         let (report, began) = mpsc::channel();
         let (refuse, refused) = mpsc::channel();
         let (acknowledge, stepped) = mpsc::channel();
@@ -178,21 +169,7 @@ impl Feel {
         };
         let ended = "the haptic thread ended before its first tick; start haptize again".to_owned();
         let (Ends { ticks, latest }, clear) = began.recv().map_err(|_| ended)?.map_err(|error| error.to_string())?;
-        Ok(Self {
-            guide,
-            ticks,
-            costs,
-            latest,
-            clear,
-            stop,
-            steps,
-            stepped,
-            refused,
-            returned,
-            threads,
-            exploration,
-            keeps_pace,
-        })
+        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, returned, threads, keeps_pace })
     }
 
     /// Ends the loop and gives back the device, without torque; none where its thread ended before.
@@ -246,11 +223,6 @@ impl Feel {
         *self.latest.read()
     }
 
-    /// The sources that answered the ticks so far, where contact is solved meanwhile.
-    pub fn answers(&mut self) -> Option<Answers> {
-        self.exploration.as_mut().map(Exploration::answers)
-    }
-
     /// Returns the requests of the haptic thread that the system refused, once.
     #[must_use]
     pub fn refused(&self) -> Option<Vec<String>> {
@@ -262,17 +234,6 @@ impl Drop for Feel {
     fn drop(&mut self) {
         self.end();
     }
-}
-
-/// Begins to solve where `device` has the proxy start.
-fn explore(
-    on_demand: &Arc<OnDemand>,
-    haptics: &Haptics,
-    gains: &HapticsSpec,
-    device: &mut dyn Device,
-) -> Result<(Live, Exploration), String> {
-    let start = haptics.start(&device.read(0.0).position).map_err(|fault| fault.to_string())?;
-    on_demand.begin(start.proxy(), gains.interpolation).map_err(|error| error.to_string())
 }
 
 fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
@@ -337,7 +298,7 @@ impl Body {
             None => Clock::of(self.device.as_ref(), period, RATE, &patience),
         };
         let (mut recorder, ends) = Recorder::new(haptics.joints());
-        let driver = Driver::new(haptics, self.device.as_mut(), self.live);
+        let driver = Driver::new(haptics, self.device.as_mut());
         match clock.map_err(SessionError::from).and_then(|clock| Ok((clock, driver?))) {
             Err(error) => drop(report.send(Err(error))),
             Ok((mut clock, mut driver)) => {
@@ -391,7 +352,7 @@ mod tests {
         let loaded = Loaded::new(baked(&scene).unwrap().0, None, None).unwrap();
         let haptics = Arc::clone(&loaded.setup.haptics);
         let guide = Guide::new(&loaded);
-        let mut feel = Feel::start(haptics, &scene.haptics, guide, TickSource::Clock, None, None).unwrap();
+        let mut feel = Feel::start(haptics, &scene.haptics, guide, TickSource::Clock, None).unwrap();
         let rests = |_: &Feel, tick: &Tick| tick.in_arrears;
         let mut ticks = until(&mut feel, rests);
         let at_rest = *ticks.last().unwrap();

@@ -10,7 +10,6 @@ use crate::{
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
     proxy::Chain,
-    render::on_demand::OnDemand,
     scene::Scene,
     sweep::{
         BackendChoice, ChosenBackend, Progress, Run, SweepError, build_object, is_worth_a_gpu, model_of, remedied,
@@ -33,13 +32,11 @@ use std::{
 /// The work to be done.
 #[derive(Clone)]
 pub enum Task {
-    /// Open a scene, and bake it, or a dataset.
+    /// Open a scene, to be solved live, or a dataset.
     Open(PathBuf),
     /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again
     /// then.
     Bake(Arc<Scene>, Option<Surface>),
-    /// Open a scene that is solved while it is felt.
-    OnDemand(Arc<OnDemand>),
 }
 
 /// The backend of a bake.
@@ -145,7 +142,6 @@ impl Job {
         let title = match &task {
             Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
             Task::Bake(scene, _) => format!("Haptizing {}", scene.name),
-            Task::OnDemand(on_demand) => format!("Opening {}", on_demand.scene().name),
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, reports) = mpsc::channel();
@@ -222,12 +218,11 @@ fn run(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Loaded, Option<Body>), Failure> {
     let loaded = match task {
-        Task::Open(path) if is_scene(&path) => bake(Scene::load(&path)?, None, solver, context, stop, progress)?,
+        Task::Open(path) if is_scene(&path) => Loaded::live(Scene::load(&path)?)?,
         Task::Open(path) => {
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
         }
-        Task::OnDemand(on_demand) => Loaded::on_demand(on_demand)?,
         Task::Bake(scene, surface) => bake((*scene).clone(), surface, solver, context, stop, progress)?,
     };
     let body = Body::new(context, &loaded, &loaded.tuning().graphics)?;

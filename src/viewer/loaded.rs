@@ -7,13 +7,13 @@ use crate::{
     render::{
         graphics::ContactForces,
         haptic::Haptics,
-        on_demand::OnDemand,
+        live::LiveScene,
         setup::{Setup, SetupError},
     },
     scene::{HapticsSpec, Scene, Tuning},
     sweep::SweepReport,
 };
-use std::{path::PathBuf, sync::Arc};
+use std::{error::Error, path::PathBuf, sync::Arc};
 
 /// A dataset that can be felt and seen. Cheap to clone: the data are shared.
 #[derive(Clone)]
@@ -30,8 +30,8 @@ pub struct Loaded {
     pub setup: Arc<Setup>,
     /// Contact forces on the object; absent where there is no object to draw.
     pub forces: Option<Arc<ContactForces>>,
-    /// The solver of its contact while it is felt; absent where everything is stored that is felt.
-    pub on_demand: Option<Arc<OnDemand>>,
+    /// The scene that is solved in every tick; absent where a dataset is felt.
+    pub live: Option<Arc<LiveScene>>,
     /// The report of the bake, if this window baked it.
     pub report: Option<Arc<SweepReport>>,
 }
@@ -50,8 +50,7 @@ impl Loaded {
             let path = file.clone().unwrap_or_else(|| setup.scene.path.clone());
             Scene::parse(&dataset.scene, path).ok()
         });
-        let forces = setup.object.as_ref().map(|object| ContactForces::new(&dataset, object.rest.len()));
-        let forces = forces.transpose()?;
+        let forces = setup.contact_forces(&dataset)?;
         Ok(Self {
             name: setup.scene.name.clone(),
             file,
@@ -59,19 +58,20 @@ impl Loaded {
             dataset: Arc::new(dataset),
             setup: Arc::new(setup),
             forces: forces.map(Arc::new),
-            on_demand: None,
+            live: None,
             report: None,
         })
     }
 
-    /// A scene that is solved while it is felt.
+    /// A `scene` that is solved in every tick.
     ///
     /// # Errors
-    /// When it cannot be rendered.
-    pub fn on_demand(on_demand: Arc<OnDemand>) -> Result<Self, SetupError> {
-        let dataset = on_demand.dataset();
-        let loaded = Self::of(Setup::explored(&dataset)?, dataset, Some(on_demand.scene().clone()), None)?;
-        Ok(Self { on_demand: Some(on_demand), ..loaded })
+    /// When it cannot be solved or rendered.
+    pub fn live(scene: Scene) -> Result<Self, Box<dyn Error + Send + Sync>> {
+        let live = Arc::new(LiveScene::new(scene.clone())?);
+        let dataset = live.dataset();
+        let loaded = Self::of(Setup::live(Arc::clone(&live), &dataset)?, dataset, Some(scene), None)?;
+        Ok(Self { live: Some(live), ..loaded })
     }
 
     /// Gains and effects as its scene has them.

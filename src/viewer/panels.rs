@@ -401,14 +401,10 @@ fn felt(ui: &mut Ui, session: &mut Session) {
         format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
     });
     ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
-    if let (Some(answers), Some(on_demand)) = (session.feel.answers(), &session.loaded.on_demand) {
+    if let Some(scene) = &session.loaded.live {
         ui.separator();
-        let coarser = 100.0 * answers.coarser as f64 / answers.ticks.max(1) as f64;
-        let text = format!("{} blocks solved, {coarser:.1} % coarser than wanted", on_demand.blocks());
-        ui.label(RichText::new(text).small()).on_hover_text(
-            "Contact is solved ahead of the motion. Ticks that came before the finest level was there were answered by \
-             a coarser one",
-        );
+        let text = scene.notice().unwrap_or("contact is solved in every tick, before the surface at rest");
+        ui.label(RichText::new("solved live").small()).on_hover_text(text);
     }
 }
 

@@ -1,7 +1,7 @@
 //! A dataset being felt: its haptic loop, what was felt lately, and the panels that belong to it alone.
 
 use super::{
-    background::{Following, Pending},
+    background::Following,
     cloud::Cloud,
     controls::Controls,
     feel::{Feel, TickSource},
@@ -14,18 +14,11 @@ use super::{
 };
 use crate::{
     JointVector,
-    dataset::Dataset,
     render::{haptic::Haptics, setup::SetupError},
     scene::HapticsSpec,
 };
 use eframe::egui::Ui;
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
-
-/// How often C-space shows what was solved meanwhile.
-const REFRESH: Duration = Duration::from_secs(1);
+use std::sync::Arc;
 
 /// A dataset being felt.
 pub struct Session {
@@ -42,9 +35,6 @@ pub struct Session {
     pub controls: Controls,
     /// A warning about the gains, if they are beyond their passivity bounds.
     pub advice: Option<String>,
-    /// Blocks of the store in what C-space shows, since when, and what will be shown next.
-    shown: (u64, Instant),
-    explored: Option<Pending<Dataset>>,
     /// Whether the cloud is shown where there is no height for plane and cloud.
     cloud_first: bool,
 }
@@ -67,26 +57,11 @@ impl Session {
         if lead.is_some() {
             guide.hand_over();
         }
-        let feel = Feel::start(haptics, &gains, guide, pace, device, loaded.on_demand.as_ref())?;
-        let shown = (0, Instant::now());
+        let feel = Feel::start(haptics, &gains, guide, pace, device)?;
         let (slices, cloud) = (Slices::new(&loaded.dataset), Cloud::new(&loaded.dataset));
         let advice = loaded.setup.advice.clone();
         let retuning = Following::new(Some(gains));
-        Ok(Self {
-            loaded,
-            feel,
-            history,
-            lead,
-            pace,
-            retuning,
-            slices,
-            cloud,
-            controls,
-            advice,
-            shown,
-            explored: None,
-            cloud_first: false,
-        })
+        Ok(Self { loaded, feel, history, lead, pace, retuning, slices, cloud, controls, advice, cloud_first: false })
     }
 
     /// Plane and cloud of C-space, one below the other, or one of them where there is no height for both.
@@ -107,23 +82,6 @@ impl Session {
         if both || self.cloud_first {
             let height = ui.available_height() - FINE_GAP;
             self.cloud.show(ui, &self.loaded, q, height);
-        }
-    }
-
-    /// Lets plane and cloud of C-space show what was solved meanwhile, once a second. `wake` is called when there is
-    /// news.
-    pub fn show_explored(&mut self, wake: impl FnOnce() + Send + 'static) {
-        let Some(on_demand) = &self.loaded.on_demand else { return };
-        let (shown, since) = self.shown;
-        if self.explored.is_none() && on_demand.blocks() > shown && since.elapsed() > REFRESH {
-            self.shown = (on_demand.blocks(), Instant::now());
-            let on_demand = Arc::clone(on_demand);
-            self.explored = Pending::begin("explored", move || on_demand.dataset(), wake).ok();
-        }
-        if let Some(Ok(dataset)) = self.explored.as_ref().and_then(Pending::poll) {
-            self.explored = None;
-            self.cloud.show_anew(&dataset);
-            self.loaded.dataset = Arc::new(dataset);
         }
     }
 
@@ -179,8 +137,7 @@ impl Session {
             }
             None => None,
         };
-        let (gains, on_demand) = (&self.controls.tuning.haptics, self.loaded.on_demand.as_ref());
-        self.feel = Feel::start(haptics, gains, guide, self.pace, device, on_demand)?;
+        self.feel = Feel::start(haptics, &self.controls.tuning.haptics, guide, self.pace, device)?;
         self.history.begin_anew();
         self.advice = advice;
         Ok(())

@@ -37,17 +37,30 @@ fn texts(loaded: &Loaded) -> [(&'static str, String); 3] {
     let grid = &loaded.dataset.grid;
     let joints: Vec<&str> = grid.axes.iter().map(|axis| axis.name.as_str()).collect();
     let (points, joints) = (grid.points(), joints.join(", "));
+    if loaded.live.is_some() {
+        return [
+            ("1  Prepare", "The object's compliance was formed: how each node moves under a force on any other.".into()),
+            (
+                "2  Solve",
+                "1000 times a second the equilibrium of arm and object is solved where the arm is, before the surface at \
+                 rest."
+                    .into(),
+            ),
+            (
+                "3  Store",
+                format!(
+                    "Nothing is stored yet. Haptize, on the left, solves the scene by its own law over the joints \
+                     {joints}, for a loop that only looks up."
+                ),
+            ),
+        ];
+    }
     let solve = match &loaded.report {
         Some(report) => {
             format!("Contact of arm and object was solved at {points} joint configurations in {:.1} s.", report.seconds)
         }
         None if loaded.dataset.surface.is_none() => {
             format!("Torque was measured and brought to {points} joint configurations.")
-        }
-        None if loaded.on_demand.is_some() => {
-            "Contact of arm and object is solved ahead of the motion, while you move; the line below says how much \
-             was solved."
-                .into()
         }
         None => format!("Contact of arm and object was solved beforehand at {points} joint configurations."),
     };

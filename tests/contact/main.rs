@@ -8,6 +8,7 @@ mod comparison;
 mod convex;
 mod fixture;
 mod invariance;
+mod live;
 mod oracle;
 mod refinement;
 mod rest;

@@ -140,17 +140,18 @@ fn a_layer_and_an_object_that_keep_their_bounds_may_break_the_one_of_both_togeth
         HapticsSpec { interpolation: Interpolation::Linear, passivity_factor: 2.0, ..setup.scene.haptics.clone() };
     let field =
         TorqueField::interpolated(&data, Interpolation::Linear, gains.threshold, &gains.boundary_slope).unwrap();
+    let field = field.into();
     let value = |gains: &HapticsSpec, what: &str| {
         let bounds = passivity::bounds(gains, &field, &labels(&data.grid));
         bounds.into_iter().find(|bound| bound.what.contains(what)).unwrap().value
     };
     // Both at 0.95 of what is safe alone.
-    let object = value(&gains, "stiffness of the dataset's torque");
+    let object = value(&gains, "stiffness of the contact torque");
     gains.proxy_damping.iter_mut().for_each(|damping| *damping *= object / 0.95);
     for joint in 0..2 {
         gains.boundary_slope[joint] = 0.95 * passivity::greatest_slope(&gains, joint);
     }
-    assert!((value(&gains, "stiffness of the dataset's torque") - 0.95).abs() < 1e-9);
+    assert!((value(&gains, "stiffness of the contact torque") - 0.95).abs() < 1e-9);
     let both = value(&gains, "layer and object together");
     assert!((both - 0.95 * 2.0_f64.sqrt()).abs() < 1e-9, "{both}");
     let exceeded = passivity::exceeded(&gains, &field, &labels(&data.grid));

@@ -42,7 +42,7 @@ pub fn pressing(joints: usize, offset: &JointVector) -> SimulatedHand {
 
 /// Runs `count` ticks; `between` is called after each with its record. Ticks allocate nothing.
 pub fn run(haptics: &Haptics, device: &mut dyn Device, count: usize, mut between: impl FnMut(&Tick)) -> Vec<Tick> {
-    let mut driver = Driver::new(haptics, device, None).unwrap();
+    let mut driver = Driver::new(haptics, device).unwrap();
     let tick = |driver: &mut Driver<'_>| assert_no_alloc(|| driver.tick(PERIOD, PERIOD)).0;
     (0..count)
         .map(|_| {

@@ -186,37 +186,6 @@ fn a_killed_command_leaves_one_file_at_most_which_the_next_removes() {
     assert_eq!(unfinished(), 0);
 }
 
-/// What is felt without a bake is saved while it is felt: a process that is killed loses some seconds of it.
-#[test]
-fn a_killed_session_on_demand_leaves_a_whole_dataset_that_the_next_goes_on_with() {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/organ.toml").display().to_string();
-    let play = |seconds| ["play", &scene, "--on-demand", "x.haptize", "-o", "felt", "--json", "--seconds", seconds];
-    let mut session = command(folder.path(), &play("600")).stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
-    let (file, began) = (folder.path().join("x.haptize"), Instant::now());
-    while !file.exists() {
-        assert!(
-            session.try_wait().unwrap().is_none() && began.elapsed() < Duration::from_secs(120),
-            "nothing is saved"
-        );
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    // Nobody else explores into the file meanwhile.
-    let second = command(folder.path(), &play("0.2")).output().unwrap();
-    assert_eq!(second.status.code(), Some(1), "{}", message(&second));
-    assert!(message(&second).contains("another session on demand keeps this file"), "{}", message(&second));
-    session.kill().unwrap();
-    session.wait().unwrap();
-    let kept = haptize::dataset::Dataset::load(&file).unwrap().refinement.unwrap().horizon();
-    assert!(kept > 100, "{kept} blocks");
-    let felt: serde_json::Value = serde_json::from_str(&succeed(folder.path(), &play("0.2"))).unwrap();
-    assert_eq!(felt["explored"]["known_blocks"].as_u64(), Some(kept));
-    let names =
-        std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let left: Vec<String> = names.filter(|name| name.ends_with(".tmp")).collect();
-    assert!(left.is_empty(), "{left:?}");
-}
-
 #[test]
 fn the_comparison_sees_one_bit() {
     let whole = Undisturbed::new("cpu", 4);

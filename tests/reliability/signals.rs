@@ -117,14 +117,14 @@ fn wait_for_rows(folder: &Path) {
     }
 }
 
-/// A signal ends a session as its time does: what was explored and the trace are kept. Each figure is there, or told to
+/// A signal ends a session as its time does: the trace is kept. Each figure is there, or told to
 /// be left out, for want of time.
 #[test]
-fn a_session_on_demand_ends_within_a_second_of_a_signal_and_keeps_what_it_has() {
+fn a_live_session_ends_within_a_second_of_a_signal_and_keeps_what_it_has() {
     let folder = tempfile::tempdir().unwrap();
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/organ.toml").display().to_string();
     for signal in listened() {
-        let play = ["play", &scene, "--on-demand", "x.haptize", "--seconds", "60", "-o", "p", "--json"];
+        let play = ["play", &scene, "--device", "simulated", "--seconds", "60", "-o", "p", "--json"];
         let wait = |child: &Child| {
             wait_for_loop(child);
             wait_for_rows(&folder.path().join("p"));
@@ -135,9 +135,9 @@ fn a_session_on_demand_ends_within_a_second_of_a_signal_and_keeps_what_it_has() 
         // A machine too busy for the loop gives it a fault.
         let code = i32::from(!told["fault"].is_null());
         assert_eq!(output.status.code(), Some(code), "{signal}: {told} {}", message(&output));
-        assert!(told["seconds"].as_f64().unwrap() > 0.0 && told["explored"]["blocks"].as_u64().unwrap() > 0, "{told}");
+        assert!(told["seconds"].as_f64().unwrap() > 0.0, "{told}");
         let files: Vec<&str> = told["files"].as_array().unwrap().iter().map(|file| file.as_str().unwrap()).collect();
-        assert!(files.contains(&"x.haptize") && files.contains(&"p/trace.csv"), "{files:?}");
+        assert!(files.contains(&"p/trace.csv"), "{files:?}");
         assert!(files.iter().all(|file| folder.path().join(file).exists()), "{files:?}");
         // A session of six joints has no force at an end.
         let figures = haptize::report::FIGURES.into_iter().filter(|name| !name.starts_with("force"));

@@ -5,6 +5,7 @@
 mod accounts;
 #[path = "../desktop/mod.rs"]
 mod desktop;
+mod live;
 mod object;
 mod press;
 mod range;

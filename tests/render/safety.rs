@@ -111,10 +111,10 @@ fn gains_beyond_their_bound_are_named_with_the_safe_value() {
     let field = |spec: &HapticsSpec| {
         TorqueField::interpolated(&data, Interpolation::Linear, 0.5, &spec.boundary_slope).unwrap()
     };
-    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)), []);
+    assert_eq!(passivity::exceeded(&spec, &field(&spec).into(), &labels(&data.grid)), []);
     spec.boundary_slope[1] = 50.0;
     spec.coupling_stiffness[0] = 30.0;
-    let found = passivity::exceeded(&spec, &field(&spec), &labels(&data.grid));
+    let found = passivity::exceeded(&spec, &field(&spec).into(), &labels(&data.grid));
     let safe: Vec<(f64, f64)> = found.iter().map(|bound| (bound.value, bound.safe)).collect();
     assert_eq!(safe[..2], [(30.0, 20.0), (50.0, 40.0)]);
     // Layer and object together: sqrt((Ks / safe)^2 + L^2) with the object's own relative stiffness L, which is less
@@ -126,9 +126,11 @@ fn gains_beyond_their_bound_are_named_with_the_safe_value() {
     // little less.
     spec.boundary_slope[1] = 0.98 * safe[1].1;
     spec.coupling_stiffness[0] = safe[0].1;
-    assert_eq!(passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)), []);
+    assert_eq!(passivity::exceeded(&spec, &field(&spec).into(), &labels(&data.grid)), []);
     spec.proxy_damping = all(2, 1e-3);
     assert!(
-        passivity::exceeded(&spec, &field(&spec), &labels(&data.grid)).iter().any(|b| b.what.starts_with("stiffness"))
+        passivity::exceeded(&spec, &field(&spec).into(), &labels(&data.grid))
+            .iter()
+            .any(|b| b.what.starts_with("stiffness"))
     );
 }

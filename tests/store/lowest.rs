@@ -4,15 +4,13 @@ use super::world::World;
 use haptize::{
     contact::Status,
     dataset::Dataset,
-    store::{Space, Store},
+    store::Store,
     sweep::{
-        CpuBackend, Run, Sweep,
-        ahead::Ahead,
-        grid_of,
+        CpuBackend, Run, Sweep, grid_of,
         refine::{Judge, Refine, Refined},
     },
 };
-use std::sync::{Arc, atomic::AtomicBool};
+use std::sync::atomic::AtomicBool;
 
 /// Contact with several equilibria.
 const SCENE: &str = include_str!("../scenes/deep_points.toml");
@@ -32,19 +30,6 @@ impl World {
         let mut backend = CpuBackend::new(&model, threads).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| refine.fill(&mut judges, &mut backend).unwrap())
-    }
-
-    /// The same blocks, each node solved from rest alone.
-    fn solved_from_rest(&self, filled: &Store) -> Arc<Store> {
-        let (model, space) = (self.model(), Space::new(&grid_of(&self.scene), 2).unwrap());
-        let store = Arc::new(Store::new(space, filled.blocks().len()));
-        let ahead = Ahead::new(&model, Arc::clone(&store));
-        let mut solver = ahead.solver();
-        for (key, _) in filled.blocks() {
-            let (level, block) = filled.space().block(key).unwrap();
-            assert!(ahead.solve(&mut solver, level, &block));
-        }
-        store
     }
 
     /// The lowest equilibria of a uniform grid of half the spacing, none of whose points is a node of the store.
@@ -76,30 +61,16 @@ fn error(store: &Store, exact: &Dataset) -> f64 {
 }
 
 #[test]
-fn a_store_of_the_lowest_equilibria_errs_less_than_one_from_rest() {
+fn a_store_of_the_lowest_equilibria_keeps_its_error_where_there_are_several() {
     let world = World::of(SCENE);
     let (filled, exact) = (world.fill_whole(2, 100), world.lowest());
-    let from_rest = world.solved_from_rest(&filled.store);
-    let [kept, missed] = [&filled.store, &*from_rest].map(|store| error(store, &exact));
-    let lowered = filled.lowered.unwrap();
-    println!("{kept} beside {missed} from rest; {lowered:?}, of {} nodes", filled.nodes);
-    assert!(kept < KEPT && missed > 5.0 * KEPT, "{kept} beside {missed} from rest");
+    let (kept, lowered) = (error(&filled.store, &exact), filled.lowered.unwrap());
+    println!("{kept}; {lowered:?}, of {} nodes", filled.nodes);
+    assert!(kept < KEPT, "{kept}");
     // What was measured while it was filled says the same, of equilibria that were lowered, too.
     assert!(filled.measured < KEPT, "{}", filled.measured);
-    let mut changed = 0;
-    for (key, block) in filled.store.blocks() {
-        let (level, place) = filled.store.space().block(key).unwrap();
-        let (lowest, rest) = (block.nodes(), from_rest.get(level, &place).unwrap().nodes());
-        assert_eq!(lowest.present, rest.present);
-        let numbers = lowest.records.len() / lowest.status.len();
-        for (lowest, rest) in lowest.records.chunks(numbers).zip(rest.records.chunks(numbers)) {
-            // The energy is half the square of the first number.
-            assert!(lowest == rest || lowest[0] < rest[0], "{lowest:?} beside {rest:?}");
-            changed += usize::from(lowest != rest);
-        }
-    }
-    assert!(changed == lowered.points && changed > 100, "{changed} changed, {lowered:?}");
-    assert!(lowered.greatest > 0.01 && lowered.rounds > 3 && lowered.searches >= changed, "{lowered:?}");
+    assert!(lowered.points > 100 && lowered.searches >= lowered.points, "{lowered:?}");
+    assert!(lowered.greatest > 0.01 && lowered.rounds > 3, "{lowered:?}");
 }
 
 #[test]

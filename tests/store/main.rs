@@ -9,7 +9,6 @@ mod file;
 mod fixture;
 mod interleavings;
 mod interpolation;
-mod live;
 mod lowest;
 mod publication;
 mod refine;

@@ -6,14 +6,12 @@ use haptize::{
     JointVector,
     contact::{Equilibrium, Status},
     dataset::{Axis, Grid},
-    store::{Space, Store, record::width},
+    store::record::width,
     sweep::{
         Backend, CpuBackend, WithFallback,
-        ahead::Ahead,
         refine::{Judge, Refine, Refined},
     },
 };
-use std::sync::Arc;
 
 /// A ball of 6 mm on two joints and a slide, pressed some 8 mm into a sphere with a skin: so deep it has one
 /// equilibrium. No node lies on a plane of symmetry.
@@ -116,28 +114,19 @@ fn nodes_hold_what_the_solver_found_and_two_fillings_are_the_same() {
     assert_eq!(one.store.blocks().len(), other.store.blocks().len());
 }
 
-/// One solver takes node after node where a store is filled on demand.
 #[test]
 fn nodes_that_are_solved_together_are_those_solved_one_by_one_to_the_bit() {
     let world = World::of(SCENE);
     let model = world.model();
-    let alone = Arc::new(Store::new(Space::new(&world.base(6), 1).unwrap(), 100));
-    let ahead = Ahead::new(&model, Arc::clone(&alone));
-    let mut solver = ahead.solver();
-    for batch in [1, 50, 1000] {
-        let mut backend = CpuBackend::new(&model, 2).unwrap();
-        let together = world.fill((6, 1, batch), 1.0, &mut backend).refined;
-        assert_eq!(together.nodes, 7 * 7 * 7);
-        for (key, block) in together.store.blocks() {
-            let (level, place) = together.store.space().block(key).unwrap();
-            if batch == 1 {
-                assert!(ahead.solve(&mut solver, level, &place));
-            }
-            assert_eq!(alone.get(level, &place).unwrap().nodes(), block.nodes(), "batches of {batch}");
-        }
-        // Free nodes near contact take an equilibrium of their own.
-        let solved = usize::try_from(ahead.solved().equilibria).unwrap();
-        assert!(together.equilibria == solved && solved > 150, "{} and {solved}", together.equilibria);
+    let fill = |batch| world.fill((6, 1, batch), 1.0, &mut CpuBackend::new(&model, 2).unwrap()).refined;
+    let alone = fill(1);
+    // Free nodes near contact take an equilibrium of their own.
+    assert!(alone.nodes == 7 * 7 * 7 && alone.equilibria > 150, "{} of {}", alone.equilibria, alone.nodes);
+    for batch in [50, 1000] {
+        let together = fill(batch);
+        assert_eq!((together.nodes, together.equilibria), (alone.nodes, alone.equilibria));
+        let blocks = alone.store.blocks().into_iter().zip(together.store.blocks());
+        blocks.for_each(|(one, other)| assert_eq!((one.0, one.1.nodes()), (other.0, other.1.nodes())));
     }
 }
 

@@ -44,7 +44,10 @@ fn what_another_process_writes_or_a_link_leads_to_is_left_alone() {
     let begin = || bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX);
     let claim = haptize::dataset::Claim::new(&folder.output()).unwrap().unwrap();
     let error = begin().unwrap_err();
-    assert!(matches!(error, SweepError::Busy { .. }) && error.to_string().contains("session on demand"), "{error}");
+    assert!(
+        matches!(error, SweepError::Busy { .. }) && error.to_string().contains("another process is writing"),
+        "{error}"
+    );
     drop(claim);
     #[cfg(unix)]
     {

@@ -58,7 +58,7 @@ impl Deformation {
         Self {
             surface: 0,
             bound: MotionBound::default(),
-            loads: Vec::new(),
+            loads: Vec::with_capacity(model.surface.positions.len()),
             displaced: vec![0; model.surface.positions.len()],
             displacement: vec![DVec3::ZERO; model.surface.positions.len()],
             positions: model.surface.positions.clone(),

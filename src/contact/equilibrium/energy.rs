@@ -107,7 +107,7 @@ pub struct StoppingCriteria {
 }
 
 /// Convergence, iterations and residual of a search.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SolverStats {
     /// Whether forces are balanced to the tolerance, or to what depths are rounded by.
     pub converged: bool,

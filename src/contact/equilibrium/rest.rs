@@ -14,7 +14,8 @@
 //! what the limit leaves out.
 //!
 //! Only nodes that touch somewhere have a row: first those below the surface at rest, and, after the program is solved,
-//! those that the surface has bulged up to, until there are no more.
+//! those that the surface has bulged up to, until there are no more. Along a way the rows that pushed last are there
+//! from the beginning ([`Start::Last`]): the solution is the same, and is found sooner.
 
 mod tangent;
 
@@ -28,24 +29,46 @@ use crate::contact::linear::support::{Support, dot};
 use crate::contact::model::Model;
 use glam::DVec3;
 
+/// What a solution is sought from. It is the same but for rounding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// The configuration alone: results do not depend on what was solved before, to the last bit.
+    Rest,
+    /// The rows that pushed at the configuration that was solved last.
+    Last,
+}
+
+/// Largest program that is solved, and for how long.
+#[derive(Clone, Copy, Debug)]
+pub struct RestLimits {
+    /// Rows.
+    pub rows: usize,
+    /// Nodes of the object on the support.
+    pub nodes: usize,
+    /// Rounds of the program.
+    pub rounds: u32,
+}
+
 /// Workspace of contact with the surface at rest, for one thread.
 pub struct RestProgram {
     /// The object's nodes that carry force, or weigh in how a row changes.
     pub support: Support,
     /// Forces on the support (N).
     pub forces: Vec<f64>,
-    /// The rows, ascending by proxy node; their depths are at rest, their multipliers the forces (m, N).
+    /// The rows, in the order in which they were found; their depths are at rest, their multipliers the forces (m, N).
     pub rows: Vec<Contact>,
     /// Elastic energy (J).
     pub elastic: f64,
     /// U (J).
     pub energy: f64,
+    limits: RestLimits,
     slots: Vec<Slots>,
+    /// Whether each proxy node that has a row pushes.
+    pushes: Vec<Option<bool>>,
     /// Displacement of the support (m).
     displacement: Vec<f64>,
-    /// C g_i of each row on the support, one row after the other, and along its normal alone (m/N).
-    columns: Vec<f64>,
-    scalars: Vec<f64>,
+    /// C g of one row, as [`Support::respond_along`] has it (m/N).
+    response: Vec<f64>,
     /// G C G^T + 1/kc (m/N).
     compliance: Vec<f64>,
     depths: Vec<f64>,
@@ -53,92 +76,143 @@ pub struct RestProgram {
 }
 
 impl RestProgram {
-    /// Room for the object of `model`.
+    /// Room for the object of `model`, which grows with the programs.
     #[must_use]
     pub fn new(model: &Model) -> Self {
+        let limits = RestLimits { rows: usize::MAX, nodes: usize::MAX, rounds: model.contact.max_iterations };
         Self {
             support: Support::new(model.surface.positions.len()),
             forces: Vec::new(),
             rows: Vec::new(),
             elastic: 0.0,
             energy: 0.0,
+            limits,
             slots: Vec::new(),
+            pushes: vec![None; model.chain.nodes.len()],
             displacement: Vec::new(),
-            columns: Vec::new(),
-            scalars: Vec::new(),
+            response: Vec::new(),
             compliance: Vec::new(),
             depths: Vec::new(),
             program: NonnegativeProgram::default(),
         }
     }
 
-    /// Solves the configuration that `detection` has taken up.
-    pub fn solve(&mut self, model: &Model, detection: &mut Detection) -> SolverStats {
-        self.support.clear();
-        self.rows.clear();
-        self.rows.extend((0..model.chain.nodes.len()).filter_map(|i| detection.at_rest(model, i, 0.0)));
-        let mut iterations = 0;
-        loop {
-            self.assemble(model);
-            let left = model.contact.max_iterations.saturating_sub(iterations);
-            let (ended, rounds) = self.program.solve(&self.compliance, &self.depths, left);
-            iterations += rounds;
-            self.take_solution(model);
-            let converged = ended && !self.add_rows(model, detection);
-            if converged || !ended {
-                return SolverStats { converged, iterations, residual: self.residual() };
-            }
+    /// Room for programs within `limits`, which nothing allocates for from then on. Beyond them none is solved.
+    #[must_use]
+    pub fn within(model: &Model, limits: RestLimits) -> Self {
+        let rows = limits.rows.min(model.chain.nodes.len());
+        let nodes = limits.nodes.min(CARRIERS * rows).min(model.surface.positions.len());
+        let limits = RestLimits { rows, nodes, ..limits };
+        let mut program = Self { limits, ..Self::new(model) };
+        program.support.reserve(nodes + CARRIERS, model.compliance.rows_per_node);
+        for vector in [&mut program.forces, &mut program.displacement, &mut program.response] {
+            vector.reserve(3 * nodes);
         }
+        program.rows.reserve(rows);
+        program.slots.reserve(rows);
+        program.compliance.reserve(rows * rows);
+        program.depths.reserve(rows);
+        program.program.reserve(rows);
+        program
     }
 
-    /// Brings the support and the program up to date with the rows.
-    fn assemble(&mut self, model: &Model) {
-        let Self { support, rows, slots, columns, scalars, compliance, depths, .. } = self;
-        slots.clear();
-        for Contact { carriers, .. } in &*rows {
-            let mut own = [0; CARRIERS];
-            for (j, (slot, &node)) in own.iter_mut().zip(carriers.nodes()).enumerate() {
-                if carriers.carries(j) {
-                    *slot = support.add(node) as u32;
-                }
+    /// Solves the configuration that `detection` has taken up; `None` where it is beyond the limits in size.
+    pub fn solve(&mut self, model: &Model, detection: &mut Detection, start: Start) -> Option<SolverStats> {
+        self.support.clear();
+        self.rows.clear();
+        self.slots.clear();
+        self.depths.clear();
+        let mut fits = true;
+        for i in 0..model.chain.nodes.len() {
+            let pushed = self.pushes[i].take().filter(|_| start == Start::Last);
+            let reach = if pushed == Some(true) { f64::INFINITY } else { 0.0 };
+            if fits && let Some(row) = detection.at_rest(model, i, reach) {
+                let pushes = pushed.unwrap_or(row.depth > 0.0);
+                fits = self.add(row, pushes);
             }
-            slots.push(own);
         }
+        let (mut iterations, mut known) = (0, 0);
+        while fits {
+            self.assemble(model, known);
+            let Self { program, compliance, depths, rows, pushes, .. } = self;
+            let guess = rows.iter().map(|row| pushes[row.proxy_node as usize] == Some(true));
+            let left = self.limits.rounds.saturating_sub(iterations);
+            let (ended, rounds) = program.solve(compliance, depths, guess, left);
+            iterations += rounds;
+            self.take_solution(model);
+            known = self.rows.len();
+            fits = !ended || self.add_rows(model, detection);
+            if !ended || fits && self.rows.len() == known {
+                self.displace_support();
+                return Some(SolverStats { converged: ended, iterations, residual: self.residual() });
+            }
+        }
+        None
+    }
+
+    /// The object's nodes that carry force.
+    pub fn loaded(&self) -> impl Iterator<Item = u32> {
+        let loaded = self.support.nodes().iter().zip(self.forces.as_chunks::<3>().0);
+        loaded.filter(|(_, force)| **force != [0.0; 3]).map(|(&node, _)| node)
+    }
+
+    /// Adds a row whose proxy node `pushes`, by a guess, and returns whether it is within the limits.
+    fn add(&mut self, row: Contact, pushes: bool) -> bool {
+        let Self { support, rows, slots, depths, limits, .. } = self;
+        let mut own = [0; CARRIERS];
+        for (j, (slot, &node)) in own.iter_mut().zip(row.carriers.nodes()).enumerate() {
+            if row.carriers.carries(j) {
+                *slot = support.add(node) as u32;
+            }
+        }
+        if rows.len() == limits.rows || support.nodes().len() > limits.nodes {
+            return false;
+        }
+        self.pushes[row.proxy_node as usize] = Some(pushes);
+        slots.push(own);
+        depths.push(row.depth);
+        rows.push(row);
+        true
+    }
+
+    /// Brings the support and the program up to date with the rows, of which the first `known` were there before.
+    fn assemble(&mut self, model: &Model, known: usize) {
+        let Self { support, rows, slots, response, compliance, .. } = self;
         support.gather(&model.compliance);
-        let (count, order) = (rows.len(), support.order());
+        response.resize(support.response_width() * support.nodes().len(), 0.0);
+        let count = rows.len();
+        widen(compliance, known, count);
         let springs = Springs { contacts: rows, slots, kc: model.kc };
-        columns.resize(count * order, 0.0);
-        compliance.resize(count * count, 0.0);
-        for i in 0..count {
-            let column = &mut columns[i * order..(i + 1) * order];
-            springs.respond(support, (i, 0..=i), (scalars, column), &mut compliance[i * count..][..=i]);
+        for i in known..count {
+            springs.respond(support, (i, 0..=i), response, &mut compliance[i * count..][..=i]);
             (0..i).for_each(|j| compliance[j * count + i] = compliance[i * count + j]);
             compliance[i * count + i] += 1.0 / (model.kc * rows[i].share);
         }
-        depths.clear();
-        depths.extend(rows.iter().map(|row| row.depth));
     }
 
-    /// Takes forces, displacement and energies from the program's solution.
+    /// Takes forces and energies from the program's solution.
     fn take_solution(&mut self, model: &Model) {
-        let Self { support, forces, rows, elastic, energy, slots, displacement, columns, depths, program, .. } = self;
-        let order = support.order();
-        for vector in [&mut *forces, displacement] {
-            vector.clear();
-            vector.resize(order, 0.0);
-        }
+        let Self { support, forces, rows, elastic, energy, slots, pushes, depths, program, .. } = self;
+        forces.clear();
+        forces.resize(support.order(), 0.0);
         *energy = 0.5 * dot(&program.solution, depths);
         *elastic = *energy;
         for (row, &force) in rows.iter_mut().zip(&program.solution) {
             row.multiplier = force;
+            pushes[row.proxy_node as usize] = Some(force > 0.0);
             *elastic -= 0.5 * force * force / (model.kc * row.share);
         }
         let springs = Springs { contacts: rows, slots, kc: model.kc };
         for (i, &force) in program.solution.iter().enumerate().filter(|(_, force)| **force > 0.0) {
             springs.add_reaction(i, &rows[i].spread(-force), forces);
-            let column = &columns[i * order..(i + 1) * order];
-            displacement.iter_mut().zip(column).for_each(|(sum, entry)| *sum -= force * entry);
         }
+    }
+
+    /// Sets the displacement of the support under the forces.
+    fn displace_support(&mut self) {
+        let Self { support, forces, displacement, .. } = self;
+        displacement.resize(forces.len(), 0.0);
+        support.multiply(forces, displacement);
     }
 
     /// Has `detection` take up the displaced surface, and returns a bound of how far that has moved (m).
@@ -148,25 +222,19 @@ impl RestProgram {
         bound.moved
     }
 
-    /// Adds a row for each proxy node without one that the displaced surface has reached, and returns whether there are
-    /// any.
+    /// Adds a row for each proxy node without one that the displaced surface has reached, and returns whether they are
+    /// within the limits.
     fn add_rows(&mut self, model: &Model, detection: &mut Detection) -> bool {
         let moved = self.displace(model, detection);
-        let Self { rows, .. } = self;
-        let known = rows.len();
-        for i in 0..model.chain.nodes.len() {
-            if rows[..known].binary_search_by_key(&(i as u32), |row| row.proxy_node).is_ok() {
-                continue;
+        (0..model.chain.nodes.len()).all(|i| {
+            if self.pushes[i].is_some() {
+                return true;
             }
-            if let Some(row) = detection.at_rest(model, i, moved)
-                && row.depth + linear_change(model, &row, detection) > 0.0
-            {
-                rows.push(row);
+            match detection.at_rest(model, i, moved) {
+                Some(row) if row.depth + linear_change(model, &row, detection) > 0.0 => self.add(row, true),
+                _ => true,
             }
-        }
-        let added = rows.len() > known;
-        rows.sort_unstable_by_key(|row| row.proxy_node);
-        added
+        })
     }
 
     /// Force on the proxy node of row `i`: along the normal, and sideways by how the row changes (N).
@@ -188,6 +256,12 @@ impl RestProgram {
             .map(|(force, slack)| if *force > 0.0 { slack.abs() } else { slack.max(0.0) });
         off.fold(0.0, f64::max) / deepest.max(f64::MIN_POSITIVE)
     }
+}
+
+/// Gives the rows of a square matrix of `from` rows the length of a matrix of `to` rows.
+fn widen(matrix: &mut Vec<f64>, from: usize, to: usize) {
+    matrix.resize(to * to, 0.0);
+    (1..from).rev().for_each(|i| matrix.copy_within(i * from..(i + 1) * from, i * to));
 }
 
 /// Returns by how much the displacement that `detection` has taken up deepens `row` (m).

@@ -22,8 +22,8 @@ pub struct Woodbury {
     taken: Vec<usize>,
     /// C g_a on the support for each of them, filled up with zeros to whole blocks (m/N).
     columns: Vec<f64>,
-    /// Column at each node of an isotropic object, along the row's normal (m/N).
-    scalars: Vec<f64>,
+    /// The one of them at hand, as [`Support::respond_along`] has it (m/N).
+    response: Vec<f64>,
     order: usize,
     /// 1 + mu (1).
     stiffening: f64,
@@ -36,7 +36,7 @@ pub struct Woodbury {
 impl Woodbury {
     /// Takes up the springs for which `touching` is true, on an object stiffened by the factor `stiffening`.
     pub fn set_up(&mut self, support: &Support, springs: Springs, touching: &[bool], stiffening: f64) {
-        let Self { taken, columns, scalars, order, factor, pushes, .. } = self;
+        let Self { taken, columns, response, order, factor, pushes, .. } = self;
         taken.clear();
         taken.extend((0..touching.len()).filter(|&row| touching[row]));
         let count = taken.len();
@@ -46,12 +46,14 @@ impl Woodbury {
         pushes.resize(count.next_multiple_of(BLOCK_SIZE), 0.0);
         columns.clear();
         columns.resize(pushes.len() * *order, 0.0);
+        response.resize(support.response_width() * support.nodes().len(), 0.0);
         factor.resize(count * count, 0.0);
         for (a, &row) in taken.iter().enumerate() {
             let column = &mut columns[a * *order..][..*order];
             let contact = &springs.contacts[row];
             let deepened = &mut factor[a * count..][..=a];
-            springs.respond(support, (row, taken[..=a].iter().copied()), (scalars, column), deepened);
+            springs.respond(support, (row, taken[..=a].iter().copied()), response, deepened);
+            support.add_response(contact.normal, response, 1.0, column);
             factor[a * count + a] += stiffening / (springs.kc * contact.share);
         }
         cholesky::factorize(factor, count);

@@ -74,7 +74,10 @@ impl Facet {
     #[inline]
     #[must_use]
     pub fn point(&self, w: [f64; 3]) -> DVec3 {
-        self.jet(w).point
+        match &self.net {
+            None => Jet::flat(&self.corners, w).point,
+            Some(net) => Jet::new(net, w).point,
+        }
     }
 
     /// Returns its outward unit normal at `w`; zero where it has none.
@@ -83,8 +86,8 @@ impl Facet {
         unit_or_zero(match self.net {
             None => area_vector(self.corners),
             Some(_) => {
-                let jet = self.jet(w);
-                jet.tangent(FACE[0]).cross(jet.tangent(FACE[1]))
+                let [first, second] = self.jet(w).face_tangents();
+                first.cross(second)
             }
         })
     }
@@ -138,8 +141,7 @@ impl Facet {
         for _ in 0..FACET_ITERATIONS {
             let jet = self.jet(w);
             let offset = jet.point - x;
-            let (a, b) = (jet.tangent(FACE[0]), jet.tangent(FACE[1]));
-            let bends = [jet.bend(FACE[0], FACE[0]), jet.bend(FACE[0], FACE[1]), jet.bend(FACE[1], FACE[1])];
+            let ([a, b], bends) = (jet.face_tangents(), jet.face_bends());
             let slope = [offset.dot(a), offset.dot(b)];
             let metric = [a.dot(a), a.dot(b), b.dot(b)];
             let full =

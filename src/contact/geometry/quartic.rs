@@ -123,6 +123,23 @@ impl Jet {
         Self { point, slopes: *corners, bends: [DVec3::ZERO; QUADRATICS] }
     }
 
+    /// The derivatives along the two directions in which a point moves over a face, towards corners 1 and 2 (m).
+    #[inline]
+    #[must_use]
+    pub fn face_tangents(&self) -> [DVec3; 2] {
+        let [from, first, second] = self.slopes;
+        [first - from, second - from]
+    }
+
+    /// The second derivatives along those: of the first, of both and of the second (m).
+    #[inline]
+    #[must_use]
+    pub fn face_bends(&self) -> [DVec3; 3] {
+        let [b00, b01, b02, b11, b12, b22] = self.bends;
+        let (first, second) = (b01 - b00, b02 - b00);
+        [(b11 - b01) - first, (b12 - b02) - first, (b22 - b02) - second]
+    }
+
     /// The derivative along `d` (m).
     #[inline]
     #[must_use]
@@ -173,6 +190,10 @@ mod tests {
                 let slope = (product(basis(moved(h, d)), &net) - product(basis(moved(-h, d)), &net)) / (2.0 * h);
                 assert!((jet.tangent(d) - slope).length() < 1e-7);
                 assert!((jet.tangent(d) - product(basis_slopes(w, d), &net)).length() < 1e-13);
+                let face = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]];
+                assert_eq!(jet.face_tangents(), face.map(|d| jet.tangent(d)));
+                let bends = [(0, 0), (0, 1), (1, 1)].map(|(k, l): (usize, usize)| jet.bend(face[k], face[l]));
+                assert_eq!(jet.face_bends(), bends);
                 for e in directions {
                     let bend = Jet::new(&net, moved(h, e)).tangent(d) - Jet::new(&net, moved(-h, e)).tangent(d);
                     assert!((jet.bend(d, e) - bend / (2.0 * h)).length() < 1e-7);

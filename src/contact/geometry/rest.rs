@@ -10,6 +10,7 @@ use super::smooth::{Shape, SmoothSurface, across};
 use crate::object::{Object, Topology};
 use crate::scene::ContactSurface;
 use glam::DVec3;
+use std::borrow::Borrow;
 
 /// A closed surface of triangles at rest, prepared for searches.
 ///
@@ -33,6 +34,8 @@ pub struct RestSurface<'a> {
     distance_bounds: DistanceBounds,
     /// The smooth surface, where contact is with that.
     pub smooth: Option<SmoothSurface>,
+    /// The facets at rest.
+    facets: Vec<Facet>,
     /// By how much its facets stand off the flat triangles at most; zero where there is none (m).
     pub bulge: f64,
     /// Mean length of the edges (m).
@@ -66,6 +69,7 @@ impl<'a> RestSurface<'a> {
             bounds: BoundingVolumes::new(&positions, triangles),
             distance_bounds: DistanceBounds::none(),
             smooth: None,
+            facets: triangles.iter().map(|&triangle| Facet::flat(normals::corners(&positions, triangle))).collect(),
             bulge: 0.0,
             mean_edge: normals::mean_edge(&positions, triangles),
             normals: (0..triangles.len()).map(|t| pseudonormal(t, Feature::Face)).collect(),
@@ -77,7 +81,8 @@ impl<'a> RestSurface<'a> {
         surface.distance_bounds = DistanceBounds::new(&surface);
         if felt == ContactSurface::Smooth {
             let smooth = SmoothSurface::new(&surface.positions, triangles, topology);
-            surface.bulge = smooth.bulge(&surface.positions);
+            surface.facets = (0..triangles.len() as u32).map(|t| smooth.facet(&surface.positions, t)).collect();
+            surface.bulge = smooth.bulge(&surface.positions, &surface.facets);
             surface.smooth = Some(smooth);
         }
         surface
@@ -118,11 +123,8 @@ impl<'a> RestSurface<'a> {
     /// Facet `t` at rest (m).
     #[inline]
     #[must_use]
-    pub fn facet_at_rest(&self, t: u32) -> Facet {
-        match &self.smooth {
-            None => Facet::flat(normals::corners(&self.positions, self.triangles[t as usize])),
-            Some(smooth) => smooth.at_rest[t as usize],
-        }
+    pub fn facet_at_rest(&self, t: u32) -> &Facet {
+        &self.facets[t as usize]
     }
 
     /// Pseudonormal at `point` of facet `t`, outward, not of length one, with nodes at `positions`; see [`normals`].
@@ -135,15 +137,20 @@ impl<'a> RestSurface<'a> {
     }
 
     /// The same of a smooth surface with these facets.
-    fn smooth_pseudonormal(&self, facet: impl Fn(usize) -> Facet, t: usize, point: &ClosestPoint) -> DVec3 {
+    fn smooth_pseudonormal<F: Borrow<Facet>>(
+        &self,
+        facet: impl Fn(usize) -> F,
+        t: usize,
+        point: &ClosestPoint,
+    ) -> DVec3 {
         let (triangles, topology) = (self.triangles, self.topology);
         match point.feature {
-            Feature::Face => facet(t).normal(point.weights),
+            Feature::Face => facet(t).borrow().normal(point.weights),
             Feature::Edge(k) => {
                 let (other, back) = across(triangles, topology, t, k);
                 let mut there = [0.0; 3];
                 (there[back], there[(back + 1) % 3]) = (point.weights[(k + 1) % 3], point.weights[k]);
-                facet(t).normal(point.weights) + facet(other).normal(there)
+                facet(t).borrow().normal(point.weights) + facet(other).borrow().normal(there)
             }
             Feature::Vertex(k) => {
                 let node = triangles[t][k];
@@ -152,7 +159,7 @@ impl<'a> RestSurface<'a> {
                     let mut there = [0.0; 3];
                     there[corner] = 1.0;
                     let facet = facet(around as usize);
-                    facet.normal(there) * facet.angle(corner)
+                    facet.borrow().normal(there) * facet.borrow().angle(corner)
                 });
                 around.sum()
             }
@@ -178,12 +185,12 @@ impl<'a> RestSurface<'a> {
     pub fn closest(&self, x: DVec3, near: u32) -> Closest {
         let mut closest = Closest::none();
         if (near as usize) < self.triangles.len() {
-            closest.consider(x, &self.facet_at_rest(near), near, f64::MAX);
+            closest.consider(x, self.facet_at_rest(near), near, f64::MAX);
         }
         self.bounds.search(x, closest.within(self.bulge), |t| {
             if t != near {
                 let least = closest.distance_squared.sqrt();
-                closest.consider(x, &self.facet_at_rest(t), t, least);
+                closest.consider(x, self.facet_at_rest(t), t, least);
             }
             closest.within(self.bulge)
         });
@@ -204,9 +211,15 @@ impl<'a> RestSurface<'a> {
         if closest.triangle == u32::MAX {
             return false;
         }
-        let facet = self.facet_at_rest(closest.triangle);
-        let offset = facet.point(closest.point.weights) - x;
-        offset.dot(self.pseudonormal_at_rest(closest.triangle, &closest.point)) > 0.0
+        let (facet, point) = (self.facet_at_rest(closest.triangle), &closest.point);
+        let jet = facet.jet(point.weights);
+        let outward = if point.feature == Feature::Face {
+            let [first, second] = jet.face_tangents();
+            first.cross(second)
+        } else {
+            self.pseudonormal_at_rest(closest.triangle, point)
+        };
+        (jet.point - x).dot(outward) > 0.0
     }
 }
 

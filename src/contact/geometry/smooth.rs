@@ -39,8 +39,6 @@ pub struct SmoothSurface {
     shape: Vec<u32>,
     /// From each node to its point of the control net, at rest (m).
     offsets: Vec<DVec3>,
-    /// The facets at rest.
-    pub at_rest: Vec<Facet>,
 }
 
 /// How the control points of a facet hang on its nodes.
@@ -187,7 +185,6 @@ impl SmoothSurface {
             shapes: vec![Shape::new([6; 3])],
             shape: Vec::new(),
             offsets: offsets(positions, triangles, topology),
-            at_rest: Vec::new(),
         };
         let mut known = HashMap::from([([6; 3], Shape::REGULAR)]);
         for t in 0..triangles.len() {
@@ -209,7 +206,6 @@ impl SmoothSurface {
                 shapes.len() as u32 - 1
             }));
         }
-        surface.at_rest = (0..triangles.len() as u32).map(|t| surface.facet(positions, t)).collect();
         surface
     }
 
@@ -253,15 +249,15 @@ impl SmoothSurface {
         self.shape[t as usize]
     }
 
-    /// Returns by how much the facets at rest stand off the flat triangles of the mesh at most, whose nodes are at
+    /// Returns by how much `facets`, all of it, stand off the flat triangles of the mesh at most, whose nodes are at
     /// `positions` (m).
     #[must_use]
-    pub fn bulge(&self, positions: &[DVec3]) -> f64 {
+    pub fn bulge(&self, positions: &[DVec3], facets: &[Facet]) -> f64 {
         let farthest = |(t, facet): (usize, &Facet)| {
             let corners = [0, 1, 2].map(|k| positions[self.nodes(t as u32)[k] as usize]);
             facet.net.iter().flatten().zip(EXPONENTS).map(|(b, at)| b.distance(flat(corners, at))).fold(0.0, f64::max)
         };
-        self.at_rest.iter().enumerate().map(farthest).fold(0.0, f64::max)
+        facets.iter().enumerate().map(farthest).fold(0.0, f64::max)
     }
 
     /// Returns a bound of the square of what displacements move the facets off the flat triangles by, where `square`

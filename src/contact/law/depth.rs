@@ -19,6 +19,7 @@ use crate::contact::MINIMUM_SQUARE;
 use crate::contact::geometry::closest_point::ClosestPoint;
 use crate::contact::geometry::closest_point::Feature;
 use crate::contact::geometry::facet::{Facet, directions};
+use crate::contact::geometry::quartic::Jet;
 use crate::contact::geometry::smooth::{CARRIERS, Shape};
 use glam::DVec3;
 use std::ops::Neg;
@@ -176,13 +177,14 @@ pub fn measure(
     pseudonormal: DVec3,
 ) -> (DVec3, f64, Curvature) {
     let mut curvature = Curvature::default();
+    let jet = facet.jet(point.weights);
     let normal;
     if point.feature == Feature::Face {
         normal = pseudonormal;
-        let foot = if facet.net.is_none() { facet.corners[0] } else { facet.point(point.weights) };
+        let foot = if facet.net.is_none() { facet.corners[0] } else { jet.point };
         curvature.distance = normal.dot(foot - x);
     } else {
-        let offset = facet.point(point.weights) - x;
+        let offset = jet.point - x;
         let length = offset.length();
         let inside = offset.dot(pseudonormal) >= 0.0;
         curvature.distance = if inside { length } else { -length };
@@ -194,27 +196,27 @@ pub fn measure(
             pseudonormal / pseudonormal.length_squared().max(MINIMUM_SQUARE).sqrt()
         };
     }
-    curvature.bend(facet, point, normal);
+    curvature.bend(&jet, facet.net.is_some(), point.feature, normal);
     (normal, radius + curvature.distance, curvature)
 }
 
 impl Curvature {
-    /// Sets all that depends on the directions in which the point may move.
+    /// Sets all that depends on the directions in which the point of a facet, which `is_bent` or not, may move on
+    /// `feature`; `jet` is the facet's there.
     #[inline]
-    fn bend(&mut self, facet: &Facet, point: &ClosestPoint, normal: DVec3) {
+    fn bend(&mut self, jet: &Jet, is_bent: bool, feature: Feature, normal: DVec3) {
         let s = self.distance;
-        let jet = facet.jet(point.weights);
-        match *directions(point.feature) {
-            [d, e] => {
-                let (a, b) = (jet.tangent(d), jet.tangent(e));
+        match *directions(feature) {
+            [_, _] => {
+                let [a, b] = jet.face_tangents();
                 self.tangents = [a, b];
                 let metric = [a.dot(a), a.dot(b), b.dot(b)];
                 let inverse = inverse(metric, MINIMUM_SQUARE);
                 self.turning = inverse;
-                if facet.net.is_none() {
+                if !is_bent {
                     return;
                 }
-                let bends = [normal.dot(jet.bend(d, d)), normal.dot(jet.bend(d, e)), normal.dot(jet.bend(e, e))];
+                let bends = jet.face_bends().map(|bend| normal.dot(bend));
                 let full = [metric[0] + s * bends[0], metric[1] + s * bends[1], metric[2] + s * bends[2]];
                 // Where the distance is hardly convex the closest point is about to leave, and no derivative holds for
                 // long.

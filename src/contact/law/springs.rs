@@ -45,24 +45,23 @@ impl<'a> Springs<'a> {
         row.normal.dot(row.moved(|j| DVec3::from_array(nodes[slots[j] as usize])))
     }
 
-    /// Sets `column` to the displacement of the support under a force of one newton along row `k`, C g_k, and
-    /// `deepened` to by how much that deepens each of the rows `others`. `scalars` is room for the column along the
-    /// row's normal (m/N).
+    /// Sets `response` to how the support moves under a force of one newton along row `k`, C g_k as
+    /// [`Support::respond_along`] has it, and `deepened` to by how much that deepens each of the rows `others` (m/N).
     pub fn respond(
         self,
         support: &Support,
         (k, others): (usize, impl Iterator<Item = usize>),
-        (scalars, column): (&mut Vec<f64>, &mut [f64]),
+        response: &mut [f64],
         deepened: &mut [f64],
     ) {
         let normal = self.contacts[k].normal;
-        let isotropic = support.respond_along(normal, self.carrying(k), scalars, column);
+        support.respond_along(normal, self.carrying(k), response);
         for (deepened, other) in deepened.iter_mut().zip(others) {
-            *deepened = if isotropic {
-                let along = self.carrying(other).map(|(slot, weight)| weight * scalars[slot]).sum::<f64>();
+            *deepened = if support.response_width() == 1 {
+                let along = self.carrying(other).map(|(slot, weight)| weight * response[slot]).sum::<f64>();
                 normal.dot(self.contacts[other].normal) * along
             } else {
-                self.depth_change(other, column)
+                self.depth_change(other, response)
             };
         }
     }

@@ -28,51 +28,73 @@ pub struct NonnegativeProgram {
     /// Lower factor of S among the free unknowns; see [`cholesky`].
     factor: Vec<f64>,
     reduced: Vec<f64>,
+    /// Unknowns that break a sign.
+    broken: Vec<usize>,
+    /// The point with x >= 0 from which the value is raised.
+    reached: Vec<f64>,
 }
 
 impl NonnegativeProgram {
-    /// Solves the program of `matrix`, row after row, and `right`, and returns whether it came to the end within
-    /// `limit` rounds, and how many it took.
-    pub fn solve(&mut self, matrix: &[f64], right: &[f64], limit: u32) -> (bool, u32) {
-        let order = right.len();
+    /// Makes room for programs of `order` unknowns, for which nothing is allocated from then on.
+    pub fn reserve(&mut self, order: usize) {
+        for vector in [&mut self.solution, &mut self.slack, &mut self.reduced, &mut self.reached] {
+            vector.reserve(order);
+        }
+        self.free.reserve(order);
+        self.broken.reserve(order);
+        self.is_free.reserve(order);
+        self.factor.reserve(order * order);
+    }
+
+    /// Solves the program of `matrix`, row after row, and `right`, from the guess which unknowns `are_free`, and returns
+    /// whether it came to the end within `limit` rounds, and how many it took.
+    pub fn solve(
+        &mut self,
+        matrix: &[f64],
+        right: &[f64],
+        are_free: impl Iterator<Item = bool>,
+        limit: u32,
+    ) -> (bool, u32) {
         self.is_free.clear();
-        self.is_free.extend(right.iter().map(|entry| *entry > 0.0));
+        self.is_free.extend(are_free);
         let (mut fewest, mut trust) = (usize::MAX, TRUST);
         for round in 1..=limit {
             self.solve_free(matrix, right);
-            let broken: Vec<usize> = (0..order).filter(|&i| self.breaks_sign(matrix, i)).collect();
-            if broken.is_empty() {
+            self.find_broken(matrix);
+            let broken = self.broken.len();
+            if broken == 0 {
                 // What is not a number stays so.
                 self.solution.iter_mut().filter(|entry| **entry < 0.0).for_each(|entry| *entry = 0.0);
                 return (true, round);
             }
-            if broken.len() < fewest {
-                (fewest, trust) = (broken.len(), TRUST);
+            if broken < fewest {
+                (fewest, trust) = (broken, TRUST);
             } else if trust > 0 {
                 trust -= 1;
             } else {
                 let (ended, rounds) = self.ascend(matrix, right, limit - round);
                 return (ended, round + rounds);
             }
-            broken.into_iter().for_each(|i| self.is_free[i] = !self.is_free[i]);
+            self.broken.iter().for_each(|&i| self.is_free[i] = !self.is_free[i]);
         }
         (false, limit)
     }
 
     /// Raises the value from the nearest point to the solution with x >= 0, and returns as [`Self::solve`] does.
     fn ascend(&mut self, matrix: &[f64], right: &[f64], limit: u32) -> (bool, u32) {
-        let mut reached: Vec<f64> = self.solution.iter().map(|entry| entry.max(0.0)).collect();
-        for (is_free, entry) in self.is_free.iter_mut().zip(&reached) {
+        self.reached.clear();
+        self.reached.extend(self.solution.iter().map(|entry| entry.max(0.0)));
+        for (is_free, entry) in self.is_free.iter_mut().zip(&self.reached) {
             *is_free = *entry > 0.0;
         }
         for round in 1..=limit {
             self.solve_free(matrix, right);
-            let Self { solution, slack, rounding, is_free, .. } = self;
+            let Self { solution, slack, rounding, is_free, reached, .. } = self;
             // Towards the best point of this set, as far as all unknowns stay positive.
             let within = |x: f64, best: f64| if best < 0.0 { x / (x - best) } else { 1.0 };
             let way = reached.iter().zip(&*solution).map(|(x, best)| within(*x, *best)).fold(1.0, f64::min);
             if way < 1.0 {
-                for ((x, best), is_free) in reached.iter_mut().zip(&*solution).zip(is_free) {
+                for ((x, best), is_free) in reached.iter_mut().zip(&*solution).zip(is_free.iter_mut()) {
                     let ends_here = within(*x, *best) <= way;
                     *x = if ends_here { 0.0 } else { *x + way * (best - *x) };
                     *is_free &= !ends_here;
@@ -89,18 +111,19 @@ impl NonnegativeProgram {
         (false, limit)
     }
 
-    /// Whether unknown `i` is negative while free, or would grow while bound, by more than rounding.
-    fn breaks_sign(&self, matrix: &[f64], i: usize) -> bool {
-        if self.is_free[i] {
-            self.solution[i] * matrix[i * (self.slack.len() + 1)] < -self.rounding
-        } else {
-            self.slack[i] > self.rounding
-        }
+    /// Finds the unknowns that are negative while free, or would grow while bound, by more than rounding.
+    fn find_broken(&mut self, matrix: &[f64]) {
+        let Self { solution, slack, rounding, is_free, broken, .. } = self;
+        let breaks = |&i: &usize| {
+            if is_free[i] { solution[i] * matrix[i * (slack.len() + 1)] < -*rounding } else { slack[i] > *rounding }
+        };
+        broken.clear();
+        broken.extend((0..slack.len()).filter(breaks));
     }
 
     /// Solves for the free unknowns, with one step of iterative refinement, and brings the slack up to date.
     fn solve_free(&mut self, matrix: &[f64], right: &[f64]) {
-        let Self { solution, slack, rounding, free, is_free, factor, reduced } = self;
+        let Self { solution, slack, rounding, free, is_free, factor, reduced, .. } = self;
         let order = right.len();
         free.clear();
         free.extend((0..order).filter(|&i| is_free[i]));
@@ -145,6 +168,11 @@ mod tests {
         (matrix.map(|(i, j)| dot(row(i), row(j)) + ridge(i, j)).collect(), (0..order).map(|_| next()).collect())
     }
 
+    /// The guess that an unknown is free if it would grow alone.
+    fn positive(right: &[f64]) -> impl Iterator<Item = bool> {
+        right.iter().map(|entry| *entry > 0.0)
+    }
+
     /// The value of the program at the solution of S x = b on each set of unknowns where that is nonnegative: the
     /// greatest of all.
     fn best_of_all_sets(matrix: &[f64], right: &[f64]) -> f64 {
@@ -168,7 +196,7 @@ mod tests {
             let order = turn % 10;
             let (matrix, right) = program(&mut next, order, 1 + turn % 7);
             let mut solver = NonnegativeProgram::default();
-            assert!(solver.solve(&matrix, &right, 200).0, "order {order}");
+            assert!(solver.solve(&matrix, &right, positive(&right), 200).0, "order {order}");
             let value = 0.5 * dot(&right, &solver.solution);
             let best = best_of_all_sets(&matrix, &right);
             assert!((value - best).abs() <= 1e-9 * best, "order {order}: {value} {best}");
@@ -183,7 +211,7 @@ mod tests {
             let order = 20 + turn;
             let (matrix, right) = program(&mut next, order, 5 + turn);
             let mut solver = NonnegativeProgram::default();
-            let (ended, rounds) = solver.solve(&matrix, &right, 200);
+            let (ended, rounds) = solver.solve(&matrix, &right, positive(&right), 200);
             assert!(ended, "order {order}");
             most = most.max(rounds);
             for i in 0..order {
@@ -204,17 +232,39 @@ mod tests {
         for _ in 0..2000 {
             let (matrix, right) = program(&mut next, 8, 3);
             let mut solver = NonnegativeProgram::default();
-            let (ended, rounds) = solver.solve(&matrix, &right, 200);
+            let (ended, rounds) = solver.solve(&matrix, &right, positive(&right), 200);
             assert!(ended);
             longest = longest.max(rounds);
         }
         assert!(longest > TRUST + 3, "the value had to be raised step by step: {longest}");
     }
 
+    /// The solution does not depend on the guess, and the right one takes one round.
+    #[test]
+    fn any_guess_leads_to_the_same_solution() {
+        let mut next = sequence(14);
+        for turn in 0..200 {
+            let order = 1 + turn % 30;
+            let (matrix, right) = program(&mut next, order, 1 + turn % 9);
+            let mut solver = NonnegativeProgram::default();
+            assert!(solver.solve(&matrix, &right, positive(&right), 400).0);
+            let expected = solver.solution.clone();
+            let size = expected.iter().fold(0.0_f64, |most, entry| most.max(*entry));
+            let guess: Vec<bool> = (0..order).map(|_| next() > 0.0).collect();
+            assert!(solver.solve(&matrix, &right, guess.into_iter(), 400).0);
+            for (found, expected) in solver.solution.iter().zip(&expected) {
+                assert!((found - expected).abs() <= 1e-7 * size, "order {order}: {found} {expected}");
+            }
+            let known = solver.solution.clone();
+            let again = solver.solve(&matrix, &right, known.iter().map(|entry| *entry > 0.0), 400);
+            assert_eq!((again, &solver.solution), ((true, 1), &known));
+        }
+    }
+
     #[test]
     fn rounds_are_limited() {
         let mut next = sequence(12);
         let (matrix, right) = program(&mut next, 40, 10);
-        assert_eq!(NonnegativeProgram::default().solve(&matrix, &right, 1), (false, 1));
+        assert_eq!(NonnegativeProgram::default().solve(&matrix, &right, positive(&right), 1), (false, 1));
     }
 }

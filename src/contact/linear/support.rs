@@ -42,6 +42,14 @@ impl Support {
         }
     }
 
+    /// Makes room for `nodes` nodes of an object with so many rows a node: nothing is allocated for them from then on.
+    pub fn reserve(&mut self, nodes: usize, rows_per_node: usize) {
+        self.nodes.reserve(nodes);
+        self.gathered.reserve(nodes);
+        self.places.reserve(nodes);
+        self.compliance.reserve((rows_per_node * nodes).pow(2));
+    }
+
     /// Forgets all nodes.
     pub fn clear(&mut self) {
         for &node in &self.nodes {
@@ -113,34 +121,40 @@ impl Support {
         }
     }
 
-    /// Sets `displacement` to that of the support under a force of one newton along `direction`, shared among slots by
-    /// their weights (m). An isotropic object, for which it returns true, moves along the direction everywhere, by the
-    /// `scalars` (m).
-    pub fn respond_along(
-        &self,
-        direction: DVec3,
-        weights: impl Iterator<Item = (usize, f64)>,
-        scalars: &mut Vec<f64>,
-        displacement: &mut [f64],
-    ) -> bool {
+    /// Numbers a node of a [response](Self::respond_along): its displacement, or where the object is isotropic, so that
+    /// every node moves along the force, the size of that alone (1).
+    #[must_use]
+    pub fn response_width(&self) -> usize {
+        self.rows_per_node
+    }
+
+    /// Sets `response`, [`response_width`](Self::response_width) numbers a node, to how the support moves under a force
+    /// of one newton along `direction`, shared among slots by their weights (m/N).
+    pub fn respond_along(&self, direction: DVec3, weights: impl Iterator<Item = (usize, f64)>, response: &mut [f64]) {
         let count = self.nodes.len();
+        response.fill(0.0);
         if self.rows_per_node == 1 {
-            scalars.clear();
-            scalars.resize(count, 0.0);
             for (slot, weight) in weights {
                 let row = &self.compliance[slot * count..(slot + 1) * count];
-                scalars.iter_mut().zip(row).for_each(|(sum, entry)| *sum += weight * entry);
+                response.iter_mut().zip(row).for_each(|(sum, entry)| *sum += weight * entry);
             }
-            for (node, size) in displacement.as_chunks_mut::<3>().0.iter_mut().zip(scalars) {
-                *node = (direction * *size).to_array();
-            }
-            return true;
+        } else {
+            let block = 9 * count;
+            let rows = |slot: usize| &self.compliance[slot * block..(slot + 1) * block];
+            add_rows(weights.map(|(slot, weight)| (rows(slot), (direction * weight).to_array())), response);
         }
-        let block = 9 * count;
-        displacement.fill(0.0);
-        let rows = |slot: usize| &self.compliance[slot * block..(slot + 1) * block];
-        add_rows(weights.map(|(slot, weight)| (rows(slot), (direction * weight).to_array())), displacement);
-        false
+    }
+
+    /// Adds the displacement that `force` newtons along `direction` make, by their `response`, to `displacement` (m).
+    pub fn add_response(&self, direction: DVec3, response: &[f64], force: f64, displacement: &mut [f64]) {
+        if self.rows_per_node == 1 {
+            let push = direction * force;
+            for (node, size) in displacement.as_chunks_mut::<3>().0.iter_mut().zip(response) {
+                *node = (DVec3::from_array(*node) + push * *size).to_array();
+            }
+        } else {
+            displacement.iter_mut().zip(response).for_each(|(sum, entry)| *sum += force * entry);
+        }
     }
 
     /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.

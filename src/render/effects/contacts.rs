@@ -4,8 +4,8 @@
 //! Between grid points `F_i(q) = share sum_c w_c F_i(q_c)`, with the weights of the torque and the factor of boundary
 //! layer and fade; likewise the share of the corners at which node i is touched. Both are continuous in q.
 //!
-//! A store of nodes at several levels keeps no forces. Over it the forces of the equilibrium solved at the proxy, times
-//! the same factor, take their place ([`crate::render::live`]).
+//! A scene that is solved live ([`crate::render::live`]) has those of the equilibrium at the proxy, times the same
+//! factor.
 
 use crate::{contact::NodeForce, dataset::Dataset, render::force_rows::ForceRows};
 use glam::DVec3;

@@ -45,7 +45,7 @@ pub(super) struct Pending<'a> {
     pub load: Load,
     /// The factor that the field puts on contact torque and forces; zero out of contact (1).
     pub share: f64,
-    /// Contact forces that were solved at the proxy (N).
+    /// Contact forces that were solved at the proxy, where they are solved live (N).
     pub solved: &'a [NodeForce],
 }
 
@@ -98,24 +98,23 @@ pub enum EffectError {
 }
 
 impl ContactEffects {
-    /// The effects of `spec` over `dataset`, felt by `chain`; `None` where the scene names none. Where the dataset is
-    /// `explored` they act by forces that are solved meanwhile. `text` and `path` are the scene's, for messages.
+    /// The effects of `spec` over `dataset`, felt by `chain`; `None` where the scene names none. Where contact is solved
+    /// `live` they act by its forces. `text` and `path` are the scene's, for messages.
     ///
     /// # Errors
     /// When the dataset lacks the contact forces.
     pub fn new(
         spec: &HapticsSpec,
-        (dataset, explored): (&Dataset, bool),
+        (dataset, live): (&Dataset, bool),
         chain: &Chain,
         text: &str,
         path: &Path,
     ) -> Result<Option<Self>, EffectError> {
         let Some(name) = spec.at_contacts() else { return Ok(None) };
-        let contacts = if explored { Some(Contacts::Solved) } else { Contacts::new(dataset, chain.nodes.len()) };
+        let contacts = if live { Some(Contacts::Solved) } else { Contacts::new(dataset, chain.nodes.len()) };
         let contacts = contacts.ok_or_else(|| {
             let remedy = if dataset.refinement.is_some() {
-                "play or view the scene with --on-demand FILE, which solves them while they are felt, or bake its grid \
-                 without --refine"
+                "play or view the scene itself, which solves them while they are felt, or bake its grid without --refine"
             } else {
                 "bake a virtual object again with this scene; for a real object, which tells no contact forces, leave \
                  it out"
@@ -130,12 +129,6 @@ impl ContactEffects {
             friction: spec.friction.as_ref().map(Friction::new),
             damping: spec.contact_damping.unwrap_or(0.0),
         }))
-    }
-
-    /// Whether they act by contact forces that are solved while they are felt.
-    #[must_use]
-    pub fn need_solved_forces(&self) -> bool {
-        matches!(self.contacts, Contacts::Solved)
     }
 
     /// Untouched. Allocates what all later ticks need.

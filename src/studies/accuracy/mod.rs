@@ -63,7 +63,7 @@ pub struct Row {
     pub series: String,
     /// The setting, with its unit.
     pub setting: String,
-    /// The setting as a number: a spacing (rad or m), ticks between solutions, a tolerance, or a factor on the scene's
+    /// The setting as a number: a spacing (rad or m), a tolerance, or a factor on the scene's
     /// own value.
     pub value: f64,
     /// Grid points, or nodes of the object.
@@ -185,7 +185,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     let own = grids::spacing(scene, &reference, extent.points, &mut study)?;
     progress("look-up and direct");
     grids::look_up(scene, &own, &mut study)?;
-    direct::followed(scene, &model, &reference, &mut study)?;
+    direct::live(scene, &model, &reference, &mut study);
     progress("contact solver, mesh, contact nodes, skin, contact stiffness");
     settings::studies(scene, &reference, &mut study)?;
     Ok(study)

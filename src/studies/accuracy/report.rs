@@ -109,7 +109,7 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
     writeln!(text, "  look-up      `linear` {:.0} ns; errors: {looked}", 1e9 * accuracy.look_up)?;
     writeln!(
         text,
-        "  direct       {:.0} us a solution in contact; errors, solved {followed}",
+        "  direct       {:.0} us a solution in contact, by the law at rest; errors, solved {followed}",
         1e6 * accuracy.solution
     )?;
     let limits = limits(accuracy);

@@ -1,0 +1,114 @@
+//! Where the contact torque of a loop comes from: a dataset, or a scene that is solved in every tick.
+
+use super::live::{LiveScene, LiveSession};
+use crate::{
+    JointVector,
+    contact::NodeForce,
+    dataset::Grid,
+    field::{Sample, TorqueField},
+};
+use std::sync::Arc;
+
+/// What of it does not change from tick to tick. Sessions share it.
+pub enum TorqueSource {
+    /// Torque that was solved or measured before, interpolated.
+    Dataset(TorqueField),
+    /// Torque that is solved in every tick.
+    Live(Arc<LiveScene>),
+}
+
+/// What one session has of it.
+pub enum Contact<'a> {
+    /// See [`TorqueSource::Dataset`].
+    Dataset(&'a TorqueField),
+    /// See [`TorqueSource::Live`].
+    Live(Box<LiveSession<'a>>),
+}
+
+impl From<TorqueField> for TorqueSource {
+    fn from(field: TorqueField) -> Self {
+        Self::Dataset(field)
+    }
+}
+
+impl TorqueSource {
+    /// The field of a dataset.
+    #[must_use]
+    pub fn field(&self) -> Option<&TorqueField> {
+        match self {
+            Self::Dataset(field) => Some(field),
+            Self::Live(_) => None,
+        }
+    }
+
+    /// Number of joints d.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        self.grid().joints()
+    }
+
+    /// The region in which the torque is known.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        match self {
+            Self::Dataset(field) => field.grid(),
+            Self::Live(scene) => scene.grid(),
+        }
+    }
+
+    /// Whether the energy U is known.
+    #[must_use]
+    pub fn has_energy(&self) -> bool {
+        match self {
+            Self::Dataset(field) => field.has_energy(),
+            Self::Live(_) => true,
+        }
+    }
+
+    /// Whether the torque is minus the gradient of that energy.
+    #[must_use]
+    pub fn is_potential(&self) -> bool {
+        match self {
+            Self::Dataset(field) => field.is_potential(),
+            Self::Live(_) => true,
+        }
+    }
+
+    /// Stiffness of the torque relative to `slopes` (1): see [`TorqueField::relative_stiffness`], a bound, and
+    /// [`LiveScene::relative_stiffness`], the greatest of many.
+    #[must_use]
+    pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
+        match self {
+            Self::Dataset(field) => field.relative_stiffness(slopes),
+            Self::Live(scene) => scene.relative_stiffness(slopes),
+        }
+    }
+
+    /// What a session needs of it.
+    #[must_use]
+    pub fn begin(&self) -> Contact<'_> {
+        match self {
+            Self::Dataset(field) => Contact::Dataset(field),
+            Self::Live(scene) => Contact::Live(Box::new(LiveSession::new(scene))),
+        }
+    }
+}
+
+impl Contact<'_> {
+    /// The contact at `q`, and how many ticks ago it was solved: none where `q` was solved, or looked up. Never
+    /// allocates.
+    pub(super) fn sample(&mut self, q: &[f64]) -> (Sample, u32) {
+        match self {
+            Self::Dataset(field) => (field.sample(q), 0),
+            Self::Live(session) => session.sample(q),
+        }
+    }
+
+    /// Forces on the proxy's nodes that were solved at the configuration sampled last (N).
+    pub(super) fn forces(&self) -> &[NodeForce] {
+        match self {
+            Self::Dataset(_) => &[],
+            Self::Live(session) => session.forces(),
+        }
+    }
+}
