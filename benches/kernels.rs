@@ -1,30 +1,29 @@
-//! How long each kernel takes on the first adapter, what it moves, and what bounds it: those of a sweep of the sphere
-//! scene, by each algorithm, and those of the object's frame update. Then what the host does beside the device, with
-//! the device itself and with a stand-in that takes no time; how fast the device is once it is busy; and whole sweeps
-//! on that adapter beside the CPU backend.
+//! How long each kernel takes on the first adapter, what it moves and computes, and what bounds it: that of a sweep, with
+//! contacts a second beside the CPU's, and those of the object's frame update. Then how fast the device is once it is
+//! busy, and whole sweeps on that adapter beside the CPU backend.
 //!
 //!     cargo bench --bench kernels
 //!
 //! Kernels are timed by the device's own clock. Bytes are what a kernel reads and writes if nothing is read twice;
-//! beside them stands the rate at which the same device copies memory. Operations are counted where they do not depend
-//! on the data.
+//! beside them stands the rate at which the same device copies memory. Operations of a contact are counted from its
+//! touches, for the kernel and the CPU alike.
 
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::Model,
-    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime, SearchCounts, stages::Stages},
+    contact::{Equilibrium, Model},
+    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime},
     object::Object,
     proxy::Chain,
-    scene::{GraphicsEffects, Scene, Shape},
-    sweep::{Backend, BackendChoice, Bake, build_object, sample},
+    scene::{Algorithm, GraphicsEffects, Scene, Shape},
+    sweep::{Backend, BackendChoice, Bake, CpuBackend, build_object, sample},
 };
 use std::{
     collections::BTreeMap,
     error::Error,
     path::Path,
     sync::{Arc, atomic::AtomicBool},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 /// The shipped sphere of 2,562 nodes, smooth, and one of 102, flat.
@@ -52,22 +51,14 @@ const FEW_WORKGROUPS: f64 = 128.0;
 const COPIED: u64 = 64 << 20;
 const COPIES: usize = 16;
 
-/// Operations in f64 (1), and bytes from the cache (B), of what the search counts. A pair of nodes: a number of C times
-/// three of a force, added up. A bent facet: 400 for its control points, if it is regular, and 1,600 for the point
-/// closest to the proxy node, from a dozen nodes and their displacements. A step of an elimination: a product,
-/// subtracted.
-const PAIR: [f64; 2] = [6.0, 8.0];
-const FACET: [f64; 2] = [2_000.0, 800.0];
-const ELIMINATION: [f64; 2] = [2.0, 16.0];
+/// Operations in f32 (1/s) and bytes from the second-level cache (B/s) of an H200, by its data sheet and as measured.
+const H200: [f64; 2] = [67e12, 5.5e12];
 
-/// Operations in f64 (1/s) and bytes from the second-level cache (B/s) of an H200, by its data sheet and as measured.
-const H200: [f64; 2] = [34e12, 5.5e12];
+/// Part of its operations that a kernel of short loops and many barriers reaches (1).
+const REACHED: f64 = 0.1;
 
-/// Every so many-th configuration is solved where the host is timed beside a software rasteriser.
-const HOST_STRIDE: usize = 16;
-
-/// Sweeps that the host is timed for beside a device that takes no time: the least counts.
-const HOST_TURNS: usize = 7;
+/// Every so many-th configuration is solved on a software rasteriser.
+const SOFTWARE_STRIDE: usize = 16;
 
 /// Sweeps of the same configurations on one adapter: with the first ones it finds how many it takes at a time, and a
 /// GPU raises its clock.
@@ -93,26 +84,24 @@ fn main() -> Result<(), Box<dyn Error>> {
         Ok(context) => kernels(&Arc::new(context), &scene)?,
         Err(error) => println!("\nkernels skipped: {error}"),
     }
-    for name in SCENES {
-        host(name, if hardware { 1 } else { HOST_STRIDE })?;
-        if hardware {
-            busy(name)?;
-        }
+    if hardware {
+        SCENES.iter().try_for_each(|name| busy(name))?;
     }
     SCENES.iter().try_for_each(|name| compare(name, if hardware { &FINER } else { &FINER[..1] }))
 }
 
+/// The scene of a file, with contact at rest.
 fn load(name: &str) -> Result<Scene, Box<dyn Error>> {
-    Ok(Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name))?)
+    let mut scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name))?;
+    scene.contact.algorithm = Algorithm::Rest;
+    Ok(scene)
 }
 
 fn kernels(context: &Arc<Context>, scene: &Scene) -> Result<(), Box<dyn Error>> {
     let (copying, hardware) = (copying(context)?, context.adapter().hardware);
     println!("copies {:.1} GB/s, as many bytes read as written", 1e-9 * copying);
     let adapter = Adapter { copying, hardware };
-    let swept = refined(scene, if hardware { SWEPT } else { 1 });
-    sweep(context, &swept, adapter)?;
-    count(context, if hardware { 1 } else { HOST_STRIDE }, adapter)?;
+    SCENES.iter().try_for_each(|name| sweep(context, name, adapter))?;
     let rings = if hardware { &RINGS[..] } else { &RINGS[..3] };
     rings.iter().try_for_each(|&rings| frames(context, scene, rings, adapter))
 }
@@ -137,130 +126,70 @@ fn copying(context: &Context) -> Result<f64, Box<dyn Error>> {
     Ok(2.0 * size as f64 * COPIES as f64 / begin.elapsed().as_secs_f64())
 }
 
-/// One sweep over the scene's whole grid, after one that is not counted: it finds how much one dispatch should hold.
-fn sweep(context: &Arc<Context>, scene: &Scene, adapter: Adapter) -> Result<(), Box<dyn Error>> {
-    let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
-    let model = Model::new(&object, &chain, scene.contact);
-    let configurations = sample(scene);
+/// One sweep over the scene's grid, after one that is not counted, with tangents as in a bake; and the same on the CPU.
+fn sweep(context: &Arc<Context>, name: &str, adapter: Adapter) -> Result<(), Box<dyn Error>> {
+    let scene = refined(&load(name)?, if adapter.hardware { SWEPT } else { 1 });
+    let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
+    let all = sample(&scene);
+    let mut model = Model::reaching(&object, &chain, scene.contact, &all)?;
+    model.with_tangent = true;
+    let stride = if adapter.hardware { 1 } else { SOFTWARE_STRIDE };
+    let configurations: Vec<JointVector> = all.into_iter().step_by(stride).collect();
     let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
     solver.solve(&configurations)?;
     context.kernel_times()?;
+    let left = solver.left_to_cpu();
     let begin = Instant::now();
     let equilibria = solver.solve(&configurations)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let touching = equilibria.iter().filter(|equilibrium| equilibrium.gap < 0.0).count();
+    let mut cpu = CpuBackend::new(&model, 0)?;
+    let begin = Instant::now();
+    cpu.solve(&configurations)?;
+    let on_cpu = begin.elapsed().as_secs_f64();
+    let touching = equilibria.iter().filter(|equilibrium| equilibrium.gap < 0.0).count() as f64;
     println!(
-        "\nsweep: {} configurations, {touching} of them in contact, {} nodes",
+        "\n{name}: {} configurations, {touching} of them in contact, {} left to the CPU, {} nodes",
         configurations.len(),
+        solver.left_to_cpu() - left,
         object.rest.len()
     );
-    let count = |kernel: &KernelTime| {
-        let at_rest = ["kinematics", "detection", "gap"];
-        let at_rest = at_rest.iter().any(|name| kernel.name.ends_with(name));
-        if at_rest { configurations.len() } else { touching }
-    };
-    table(&context.kernel_times()?, "configuration", count, &BTreeMap::new(), seconds, adapter);
-    Ok(())
-}
-
-/// The search in f64 for every `stride`-th configuration of the shipped sphere scene: what it takes, counted by the
-/// kernels themselves, and the rates to which that bounds an H200.
-fn count(context: &Arc<Context>, stride: usize, adapter: Adapter) -> Result<(), Box<dyn Error>> {
-    let scene = load("datasets/sphere.toml")?;
-    let scene = refined(&scene, if adapter.hardware { SWEPT } else { 1 });
-    let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
-    let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
-    let configurations: Vec<JointVector> = sample(&scene).into_iter().step_by(stride).collect();
-    let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
-    if !solver.is_exact() {
-        println!("\nno f64 here: nothing is counted of the search in f64");
-        return Ok(());
-    }
-    // The first time finds how much one dispatch should hold, and wakes the device.
-    if adapter.hardware {
-        solver.solve(&configurations)?;
-    }
-    context.kernel_times()?;
-    let (_, begin) = (context.search_counts(), Instant::now());
-    solver.solve(&configurations)?;
-    let (seconds, times, counts) = (begin.elapsed().as_secs_f64(), context.kernel_times()?, context.search_counts());
-    println!("\nsearch in f64, the shipped sphere scene, {} configurations", configurations.len());
-    let work = work(&counts);
-    let dispatches = |name: &str| times.iter().find(|kernel| kernel.name == name).map_or(1, |kernel| kernel.dispatches);
-    let operations = work.iter().map(|&(name, [operations, _])| (name, operations / dispatches(name) as f64)).collect();
-    let touching = counts.configurations as usize;
-    table(&times, "configuration in contact", |_| touching, &operations, seconds, adapter);
-    let (each, trials) = (|sum: u64| sum as f64 / counts.configurations as f64, counts.trials as f64);
+    let [operations, bytes] = work(&model, &equilibria).map(|sum| sum / touching);
+    let times = context.kernel_times()?;
+    let dispatches = times.iter().map(|kernel| kernel.dispatches).sum::<u64>().max(1) as f64;
+    let each = BTreeMap::from([("rest", operations * touching / dispatches)]);
+    table(&times, "configuration", |_| configurations.len(), &each, seconds, adapter);
+    let kernel: f64 = times.iter().map(|kernel| kernel.seconds).sum();
     println!(
-        "  {touching} in contact, {:.2} trials each. A trial: {:.0} nodes displaced by {:.0}, {:.1} proxy nodes near, {:.0} \
-         facets measured, {:.1} iterations with {:.0} pairs, {:.0} steps of eliminations",
-        each(counts.trials),
-        counts.displaced as f64 / trials,
-        counts.displaced_pairs as f64 / counts.displaced as f64,
-        counts.candidates as f64 / trials,
-        counts.facets as f64 / trials,
-        counts.iterations as f64 / trials,
-        counts.stepped_pairs as f64 / counts.iterations as f64,
-        counts.eliminations as f64 / trials,
+        "  a contact takes {:.0} thousand operations and {:.0} kB of the compliance",
+        1e-3 * operations,
+        1e-3 * bytes
     );
-    println!("  {:<24} {:>18} {:>10}  bound on an H200 by", "a configuration takes", "[M operations]", "[kB]");
-    let mut whole = [0.0; 2];
-    for (name, amounts) in work {
-        let [operations, bytes] = amounts.map(|amount| amount / counts.configurations as f64);
-        let bound = if operations / H200[0] > bytes / H200[1] { "arithmetic" } else { "memory" };
-        println!("  {name:<24} {:>18.3} {:>10.1}  {bound}", 1e-6 * operations, 1e-3 * bytes);
-        whole = [whole[0] + operations, whole[1] + bytes];
+    for (what, seconds) in [("kernel", kernel), ("adapter and host", seconds), ("CPU", on_cpu)] {
+        let rate = touching / seconds;
+        println!("  {what:<18} {rate:>12.0} contacts/s {:>10.2} GFLOP/s", 1e-9 * rate * operations);
     }
-    let [peak, memory] = [0, 1].map(|k| 1e-6 * H200[k] / whole[k]);
-    let kernels: f64 = times.iter().map(|kernel| kernel.seconds).sum();
+    let bounds = [REACHED * H200[0] / operations, H200[1] / bytes].map(|rate| 1e-6 * rate);
     println!(
-        "  an H200 is bound to {memory:.1} million in contact a second by its memory, to {peak:.1} by its arithmetic; \
-         here: {:.3}",
-        1e-6 * counts.configurations as f64 / kernels
+        "  an H200 is bound to {:.1} million contacts a second by a tenth of its arithmetic, to {:.1} by its cache",
+        bounds[0], bounds[1]
     );
     Ok(())
 }
 
-/// Operations and bytes of what was counted, by kernel.
-fn work(counts: &SearchCounts) -> [(&'static str, [f64; 2]); 3] {
-    let sum = |parts: &[(u64, [f64; 2])]| [0, 1].map(|k| parts.iter().map(|(count, of)| *count as f64 * of[k]).sum());
-    [
-        ("search_detect", sum(&[(counts.displaced_pairs, PAIR), (counts.facets, FACET)])),
-        ("search_judge", sum(&[(counts.judged_pairs, PAIR)])),
-        ("search_step", sum(&[(counts.stepped_pairs, PAIR), (counts.eliminations, ELIMINATION)])),
-    ]
-}
-
-/// Where the host's time goes for every `stride`-th configuration of a scene: beside the adapter, and beside what it
-/// found, returned at once.
-fn host(name: &str, stride: usize) -> Result<(), Box<dyn Error>> {
-    let scene = load(name)?;
-    let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
-    let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene))?;
-    let configurations: Vec<JointVector> = sample(&scene).into_iter().step_by(stride).collect();
-    let mut solver = GpuSolver::new(Arc::new(Context::open(AdapterChoice::Any)?), &model)?;
-    let recorded = solver.record(&configurations)?;
-    println!("\nhost, {name}: {} configurations [us each]", configurations.len());
-    println!(
-        "  {:<22} {:>10} {:>10} {:>10} {:>10} {:>14}",
-        "beside", "submitting", "reading", "settling", "assembling", "but settling"
-    );
-    let print = |beside: &str, times: [f64; 5]| {
-        let [submitting, reading, settling, assembling, others] = times;
-        println!(
-            "  {beside:<22} {submitting:>10.2} {reading:>10.2} {settling:>10.2} {assembling:>10.2} {others:>14.2}"
-        );
-    };
-    print("the adapter", host_times(&mut solver, &configurations)?);
-    let mut least = [f64::INFINITY; 5];
-    for _ in 0..HOST_TURNS {
-        let times = host_times(&mut GpuSolver::of(vec![recorded.clone()], &model), &configurations)?;
-        if times[4] < least[4] {
-            least = times;
-        }
+/// Operations (1) and bytes of the compliance (B) that the contacts take: for each pair of a row's nodes with another
+/// row's one entry of S, then the displacement by all forces and by the load of each joint; and factors of S.
+fn work(model: &Model<'_>, equilibria: &[Equilibrium]) -> [f64; 2] {
+    let numbers = if model.compliance.rows_per_node == 1 { 1.0 } else { 9.0 };
+    let mut sums = [0.0; 2];
+    for equilibrium in equilibria {
+        let rows = equilibrium.touches.len() as f64;
+        let nodes: f64 = equilibrium.touches.iter().map(|touch| touch.carriers.len() as f64).sum();
+        let (pairs, loads) = (nodes * nodes, 1.0 + equilibrium.torque.len() as f64);
+        let factors = f64::from(equilibrium.iterations) * rows.powi(3) / 3.0;
+        sums[0] += pairs * (0.5 * 2.0 * numbers + loads * 6.0 * numbers.sqrt()) + factors;
+        sums[1] += pairs * (0.5 + loads) * 4.0 * numbers;
     }
-    print("what takes no time", least);
-    Ok(())
+    sums
 }
 
 /// Configurations a second of the adapter, solved again and again in memory: the last four times.
@@ -280,20 +209,6 @@ fn busy(name: &str) -> Result<(), Box<dyn Error>> {
     println!("\nbusy, {name}: {count} configurations, {left} left to the CPU");
     println!("  {} a second", rates[BUSY_TURNS - 4..].join(", "));
     Ok(())
-}
-
-/// Time of the host to solve: submitting, reading, settling, assembling, and all but settling (us a configuration).
-fn host_times<S: Stages>(
-    solver: &mut GpuSolver<'_, S>,
-    configurations: &[JointVector],
-) -> Result<[f64; 5], Box<dyn Error>> {
-    let begin = Instant::now();
-    solver.solve(configurations)?;
-    let whole = begin.elapsed();
-    let time = solver.host_time();
-    let each = |time: Duration| 1e6 * time.as_secs_f64() / configurations.len() as f64;
-    let others = whole.saturating_sub(time.settling);
-    Ok([time.submitting, time.reading, time.settling, time.assembling, others].map(each))
 }
 
 /// `scene` on a grid so many times as fine.

@@ -7,12 +7,12 @@ const FEATURE_FACE: u32 = 6u;
 
 struct ClosestPoint {
     // Barycentric weights of the three corners.
-    weights: vec3<real>,
+    weights: vec3<f32>,
     feature: u32,
 }
 
 // Closest point of the triangle (a, b, c) to x.
-fn closest_point(x: vec3<real>, a: vec3<real>, b: vec3<real>, c: vec3<real>) -> ClosestPoint {
+fn closest_point(x: vec3<f32>, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> ClosestPoint {
     let ab = b - a;
     let ac = c - a;
     let ax = x - a;
@@ -48,12 +48,12 @@ fn closest_point(x: vec3<real>, a: vec3<real>, b: vec3<real>, c: vec3<real>) -> 
     let area = max(area_a + area_b + area_c, LEAST_DIVISOR);
     let weight_b = area_b / area;
     let weight_c = area_c / area;
-    return ClosestPoint(vec3<real>(1.0 - weight_b - weight_c, weight_b, weight_c), FEATURE_FACE);
+    return ClosestPoint(vec3<f32>(1.0 - weight_b - weight_c, weight_b, weight_c), FEATURE_FACE);
 }
 
 // One at corner k, zero at the others.
-fn one_hot(k: u32) -> vec3<real> {
-    return vec3<real>(vec3<u32>(0u, 1u, 2u) == vec3<u32>(k));
+fn one_hot(k: u32) -> vec3<f32> {
+    return vec3<f32>(vec3<u32>(0u, 1u, 2u) == vec3<u32>(k));
 }
 
 // Corner k.
@@ -62,6 +62,6 @@ fn vertex(k: u32) -> ClosestPoint {
 }
 
 // The point at share t along edge k.
-fn edge(k: u32, t: real) -> ClosestPoint {
+fn edge(k: u32, t: f32) -> ClosestPoint {
     return ClosestPoint((1.0 - t) * one_hot(k) + t * one_hot((k + 1u) % 3u), FEATURE_EDGE + k);
 }

@@ -2,42 +2,42 @@
 // src/contact/geometry/facet.rs and quartic.rs). For one invocation; geometry is relative to the point in question,
 // which is the origin.
 //
-// The stage declares SMOOTH, and `form(facet, x)`, which takes a facet for the current one, relative to x.
+// The stage declares SMOOTH.
 
 // Control points of the current facet, in the twin's order; of a flat one only the corners, in places 0, 10 and 14.
-var<private> net: array<vec3<real>, 15>;
+var<private> net: array<vec3<f32>, 15>;
 
 // Directions of the weights in which a point moves over a face.
-const TOWARDS_1: vec3<real> = vec3<real>(-1.0, 1.0, 0.0);
-const TOWARDS_2: vec3<real> = vec3<real>(-1.0, 0.0, 1.0);
+const TOWARDS_1: vec3<f32> = vec3<f32>(-1.0, 1.0, 0.0);
+const TOWARDS_2: vec3<f32> = vec3<f32>(-1.0, 0.0, 1.0);
 
 // That in which it moves along edge k.
-fn along_edge(k: u32) -> vec3<real> {
+fn along_edge(k: u32) -> vec3<f32> {
     return one_hot((k + 1u) % 3u) - one_hot(k);
 }
 
 // A point with its derivatives by the weights: `slopes` by each, `bend_ij` by two of them.
 struct Jet {
-    point: vec3<real>,
-    slopes: mat3x3<real>,
-    bend_00: vec3<real>,
-    bend_01: vec3<real>,
-    bend_02: vec3<real>,
-    bend_11: vec3<real>,
-    bend_12: vec3<real>,
-    bend_22: vec3<real>,
+    point: vec3<f32>,
+    slopes: mat3x3<f32>,
+    bend_00: vec3<f32>,
+    bend_01: vec3<f32>,
+    bend_02: vec3<f32>,
+    bend_11: vec3<f32>,
+    bend_12: vec3<f32>,
+    bend_22: vec3<f32>,
 }
 
-fn blend(w: vec3<real>, a: vec3<real>, b: vec3<real>, c: vec3<real>) -> vec3<real> {
+fn blend(w: vec3<f32>, a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> vec3<f32> {
     return w.x * a + w.y * b + w.z * c;
 }
 
 // Its point at weights w, by de Casteljau's algorithm. Without loops, so that compilers keep all control points in
 // registers.
-fn jet_at(w: vec3<real>) -> Jet {
+fn jet_at(w: vec3<f32>) -> Jet {
     if !SMOOTH {
         var flat = Jet();
-        flat.slopes = mat3x3<real>(net[0], net[10], net[14]);
+        flat.slopes = mat3x3<f32>(net[0], net[10], net[14]);
         flat.point = blend(w, net[0], net[10], net[14]);
         return flat;
     }
@@ -60,42 +60,42 @@ fn jet_at(w: vec3<real>) -> Jet {
     let l0 = blend(w, q0, q1, q2);
     let l1 = blend(w, q1, q3, q4);
     let l2 = blend(w, q2, q4, q5);
-    return Jet(blend(w, l0, l1, l2), mat3x3<real>(4.0 * l0, 4.0 * l1, 4.0 * l2),
+    return Jet(blend(w, l0, l1, l2), mat3x3<f32>(4.0 * l0, 4.0 * l1, 4.0 * l2),
         12.0 * q0, 12.0 * q1, 12.0 * q2, 12.0 * q3, 12.0 * q4, 12.0 * q5);
 }
 
 // Derivative along d, and along d and e.
-fn tangent(jet: Jet, d: vec3<real>) -> vec3<real> {
+fn tangent(jet: Jet, d: vec3<f32>) -> vec3<f32> {
     return blend(d, jet.slopes[0], jet.slopes[1], jet.slopes[2]);
 }
 
-fn bend(jet: Jet, d: vec3<real>, e: vec3<real>) -> vec3<real> {
+fn bend(jet: Jet, d: vec3<f32>, e: vec3<f32>) -> vec3<f32> {
     return blend(e, blend(d, jet.bend_00, jet.bend_01, jet.bend_02), blend(d, jet.bend_01, jet.bend_11, jet.bend_12),
         blend(d, jet.bend_02, jet.bend_12, jet.bend_22));
 }
 
 // Its outward unit normal; zero where it has none.
-fn normal_of(jet: Jet) -> vec3<real> {
+fn normal_of(jet: Jet) -> vec3<f32> {
     return unit_or_zero(cross(tangent(jet, TOWARDS_1), tangent(jet, TOWARDS_2)));
 }
 
-// Angle at corner k between the two edges. It is only a weight: arctangent, good to 4096 ULP in f32, is more than it
+// Angle at corner k between the two edges. It is only a weight: arctangent, good to 4096 ULP, is more than it
 // needs.
-fn angle_at(jet: Jet, k: u32) -> real {
+fn angle_at(jet: Jet, k: u32) -> f32 {
     let left = unit_or_zero(tangent(jet, along_edge(k)));
     let right = -unit_or_zero(tangent(jet, along_edge((k + 2u) % 3u)));
-    return real(atan2(f32(length(cross(left, right))), f32(dot(left, right))));
+    return atan2(length(cross(left, right)), dot(left, right));
 }
 
 // A point of a facet, and its distance from the origin.
 struct MeasuredPoint {
     point: ClosestPoint,
-    distance: real,
+    distance: f32,
 }
 
 // The point of the current facet that is closest to the origin.
 fn closest_on_facet() -> MeasuredPoint {
-    let flat = closest_point(vec3<real>(0.0), net[0], net[10], net[14]);
+    let flat = closest_point(vec3<f32>(0.0), net[0], net[10], net[14]);
     if !SMOOTH {
         return MeasuredPoint(flat, length(blend(flat.weights, net[0], net[10], net[14])));
     }
@@ -109,12 +109,12 @@ const FOUND: u32 = 4u;
 // The same on a bent facet, searched from `start`: where the distance is least on the facet continued beyond its edges
 // or, if that is outside, on the edges beyond which it lies. One loop for all, so that invocations that are on the face
 // and on edges go together.
-fn closest_on_bent_facet(start: vec3<real>) -> MeasuredPoint {
+fn closest_on_bent_facet(start: vec3<f32>) -> MeasuredPoint {
     var best = MeasuredPoint(ClosestPoint(start, FEATURE_FACE), FAR_AWAY);
     var on = ON_FACE;
     var point = best.point;
     // Place on the edge, from its first corner to its second.
-    var t = real(0.0);
+    var t = 0.0;
     var steps = 0u;
     // A bit for each edge that is left.
     var edges = 0u;
@@ -129,7 +129,7 @@ fn closest_on_bent_facet(start: vec3<real>) -> MeasuredPoint {
             let step = step_on_face(jet);
             let u = point.weights.y + step.x;
             let v = point.weights.z + step.y;
-            let w = vec3<real>(1.0 - u - v, u, v);
+            let w = vec3<f32>(1.0 - u - v, u, v);
             point.weights = w;
             steps += 1u;
             // Far outside Newton's method would not come back.
@@ -161,7 +161,7 @@ fn closest_on_bent_facet(start: vec3<real>) -> MeasuredPoint {
         edges &= edges - 1u;
         let head = dot(start, one_hot((on + 1u) % 3u));
         let sum = head + dot(start, one_hot(on));
-        t = select(real(0.5), head / max(sum, LEAST_DIVISOR), sum > 0.0);
+        t = select(0.5, head / max(sum, LEAST_DIVISOR), sum > 0.0);
         point.weights = on_edge(on, t);
         steps = 0u;
     }
@@ -169,30 +169,30 @@ fn closest_on_bent_facet(start: vec3<real>) -> MeasuredPoint {
 }
 
 // The point at t along edge k.
-fn on_edge(k: u32, t: real) -> vec3<real> {
+fn on_edge(k: u32, t: f32) -> vec3<f32> {
     return (1.0 - t) * one_hot(k) + t * one_hot((k + 1u) % 3u);
 }
 
 // Newton's step of the last two weights towards the least distance.
-fn step_on_face(jet: Jet) -> vec2<real> {
+fn step_on_face(jet: Jet) -> vec2<f32> {
     let a = tangent(jet, TOWARDS_1);
     let b = tangent(jet, TOWARDS_2);
-    let slope = vec2<real>(dot(jet.point, a), dot(jet.point, b));
-    let metric = vec3<real>(dot(a, a), dot(a, b), dot(b, b));
-    let full = metric + vec3<real>(dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_1)),
+    let slope = vec2<f32>(dot(jet.point, a), dot(jet.point, b));
+    let metric = vec3<f32>(dot(a, a), dot(a, b), dot(b, b));
+    let full = metric + vec3<f32>(dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_1)),
         dot(jet.point, bend(jet, TOWARDS_1, TOWARDS_2)), dot(jet.point, bend(jet, TOWARDS_2, TOWARDS_2)));
     // Where the distance is not convex, the metric alone leads downhill.
     let h = select(metric, full, full.x > 0.0 && full.x * full.z > full.y * full.y);
     let determinant = max(h.x * h.z - h.y * h.y, LEAST_DIVISOR);
-    return vec2<real>(h.y * slope.y - h.z * slope.x, h.y * slope.x - h.x * slope.y) / determinant;
+    return vec2<f32>(h.y * slope.y - h.z * slope.x, h.y * slope.x - h.x * slope.y) / determinant;
 }
 
 // Where Newton's step leads from t along edge k.
-fn step_on_edge(jet: Jet, k: u32, t: real) -> real {
+fn step_on_edge(jet: Jet, k: u32, t: f32) -> f32 {
     let direction = along_edge(k);
     let along = tangent(jet, direction);
     let metric = dot(along, along);
     let full = metric + dot(jet.point, bend(jet, direction, direction));
     let next = t - dot(jet.point, along) / max(select(metric, full, full > 0.0), LEAST_DIVISOR);
-    return min(max(next, real(0.0)), real(1.0));
+    return min(max(next, 0.0), 1.0);
 }

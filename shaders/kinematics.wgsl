@@ -1,51 +1,86 @@
-// Positions x_i of all proxy nodes for a batch of configurations: one invocation a (configuration, node). No
-// trigonometry: the host sends cosine and sine of every joint, or the displacement of a prismatic one.
+// Where the arm is. No trigonometry: the host sends cosine and sine of every joint, or the displacement of a prismatic
+// one.
 
-override WORKGROUP: u32 = 64u;
-
-@group(0) @binding(0) var<uniform> parameters: Parameters;
-// Of each joint its origin, axis and kind (0 revolute, 1 prismatic); then of each proxy node its position in its link's
-// frame and that link.
-@group(0) @binding(1) var<storage, read> chain: array<real>;
-// Configuration by configuration, joint fastest: (cos q, sin q), or (q, 0) of a prismatic joint.
-@group(0) @binding(2) var<storage, read> motions: array<vec2<real>>;
-// Configuration by configuration, node fastest: three coordinates each.
-@group(0) @binding(3) var<storage, read_write> placed: array<real>;
-// The same in f32; w is left for the gap.
-@group(0) @binding(4) var<storage, read_write> positions: array<vec4<f32>>;
-
-fn vector_at(at: u32) -> vec3<real> {
-    return vec3<real>(chain[at], chain[at + 1u], chain[at + 2u]);
+// Rodrigues: v turned about the unit vector `axis` by the angle with the given cosine and sine.
+fn turn(axis: vec3<f32>, motion: vec2<f32>, v: vec3<f32>) -> vec3<f32> {
+    return motion.x * v + motion.y * cross(axis, v) + ((1.0 - motion.x) * dot(axis, v)) * axis;
 }
 
-@compute @workgroup_size(WORKGROUP)
-fn main(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let index = unfold(group, groups) * WORKGROUP + local;
-    let configuration = index / parameters.proxy_nodes;
-    if configuration >= parameters.configurations {
-        return;
-    }
-    let node = 7u * parameters.joints + 4u * (index % parameters.proxy_nodes);
-    // From the tip inwards: each joint moves the point from its link's frame into its parent's. One vector is turned,
-    // instead of a matrix being built from the root outwards.
-    var x = vector_at(node);
-    for (var k = i32(chain[node + 3u]); k >= 0; k -= 1) {
-        let joint = 7u * u32(k);
-        let axis = vector_at(joint + 3u);
-        let motion = motions[configuration * parameters.joints + u32(k)];
-        if chain[joint + 6u] == 0.0 {
-            x = turn(axis, motion, x);
-        } else {
+fn chain_vector(at: u32) -> vec3<f32> {
+    return vec3<f32>(chain[at], chain[at + 1u], chain[at + 2u]);
+}
+
+fn slides(joint: u32) -> bool {
+    return chain[7u * joint + 6u] != 0.0;
+}
+
+// Place of the point `position` in the frame of link `links - 1`; of link -1 that is the world. From the tip inwards
+// each joint moves the point from its link's frame into its parent's.
+fn placed(configuration: u32, position: vec3<f32>, links: u32) -> vec3<f32> {
+    var x = position;
+    for (var k = links; k > 0u; k -= 1u) {
+        let joint = k - 1u;
+        let axis = chain_vector(7u * joint + 3u);
+        let motion = motions[configuration * parameters.joints + joint];
+        if slides(joint) {
             x += motion.x * axis;
+        } else {
+            x = turn(axis, motion, x);
         }
-        x += vector_at(joint);
+        x += chain_vector(7u * joint);
     }
-    placed[3u * index] = x.x;
-    placed[3u * index + 1u] = x.y;
-    placed[3u * index + 2u] = x.z;
-    positions[index] = vec4<f32>(vec3<f32>(x), 0.0);
+    return x;
+}
+
+// The same of a direction.
+fn turned(configuration: u32, direction: vec3<f32>, links: u32) -> vec3<f32> {
+    var v = direction;
+    for (var k = links; k > 0u; k -= 1u) {
+        let joint = k - 1u;
+        if !slides(joint) {
+            v = turn(chain_vector(7u * joint + 3u), motions[configuration * parameters.joints + joint], v);
+        }
+    }
+    return v;
+}
+
+fn at_proxy_node(node: u32) -> u32 {
+    return 7u * parameters.joints + 6u * node;
+}
+
+fn link_of(node: u32) -> u32 {
+    return u32(chain[at_proxy_node(node) + 3u]);
+}
+
+fn radius_of(node: u32) -> f32 {
+    return chain[at_proxy_node(node) + 4u];
+}
+
+fn share_of(node: u32) -> f32 {
+    return chain[at_proxy_node(node) + 5u];
+}
+
+fn node_at(configuration: u32, node: u32) -> vec3<f32> {
+    return placed(configuration, chain_vector(at_proxy_node(node)), link_of(node) + 1u);
+}
+
+// Point of each joint's axis, and the axis.
+var<workgroup> origins: array<vec3<f32>, JOINTS>;
+var<workgroup> axes: array<vec3<f32>, JOINTS>;
+
+// Places the joints. For all invocations together.
+fn place_joints(configuration: u32, local: u32) {
+    if local < parameters.joints {
+        origins[local] = placed(configuration, chain_vector(7u * local), local);
+        axes[local] = turned(configuration, chain_vector(7u * local + 3u), local);
+    }
+    workgroupBarrier();
+}
+
+// Velocity of proxy node `node` at x by joint k.
+fn jacobian_column(node: u32, x: vec3<f32>, k: u32) -> vec3<f32> {
+    if k > link_of(node) {
+        return vec3<f32>(0.0);
+    }
+    return select(cross(axes[k], x - origins[k]), axes[k], slides(k));
 }

@@ -29,7 +29,7 @@ fn place_of_corner(triangle: u32, node: u32) -> u32 {
 }
 
 // v scaled to length one; a vector too short to have a direction becomes zero.
-fn unit_or_zero(v: vec3<real>) -> vec3<real> {
+fn unit_or_zero(v: vec3<f32>) -> vec3<f32> {
     let square = dot(v, v);
-    return select(vec3<real>(0.0), v / sqrt(max(square, LEAST_DIVISOR)), square > LEAST_DIVISOR);
+    return select(vec3<f32>(0.0), v / sqrt(max(square, LEAST_DIVISOR)), square > LEAST_DIVISOR);
 }

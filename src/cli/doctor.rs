@@ -141,7 +141,6 @@ impl Graphics {
             let head = if rank == 0 && self.missing.is_empty() { "graphics adapters" } else { "" };
             let address = if adapter.address.is_empty() { "" } else { " at " };
             writeln!(text, "{head:<22} {adapter}{address}{}", adapter.address)?;
-            writeln!(text, "{:<22} -> {}", "", tier(adapter))?;
         }
         let solving = match self.solves.iter().filter(|solves| **solves).count() {
             0 | 1 => "the first is taken".to_owned(),
@@ -170,19 +169,9 @@ impl Graphics {
                 "hardware": adapter.hardware,
                 "solves": solves,
                 "binding_limit_bytes": adapter.binding_limit,
-                "decides_in_f64": adapter.double,
             })
         };
         pairs.map(one).collect()
-    }
-}
-
-/// Part of a bake that an adapter does.
-fn tier(adapter: &AdapterSummary) -> &'static str {
-    if adapter.double {
-        "solves in f64, from contact or not to torque"
-    } else {
-        "has no f64 in shaders: solves in f32; the CPU decides contact near none, and settles forces"
     }
 }
 

@@ -139,19 +139,6 @@ impl<'a> Solver<'a> {
         Equilibrium { gap, iterations: outcome.iterations, ..unknown(joints) }
     }
 
-    /// Whether the compliance covers all that `equilibrium`, which was found elsewhere at the joint coordinates `q`,
-    /// depends on.
-    #[must_use]
-    pub(crate) fn covers(&mut self, q: &[f64], equilibrium: &Equilibrium) -> bool {
-        let Self { model, pose, detection, energy, .. } = self;
-        model.chain.pose(q, pose);
-        detection.set_configuration(model, &pose.nodes);
-        energy.hold(&equilibrium.forces);
-        (self.held_by, self.displacement) = (HeldBy::Energy, None);
-        let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length()).fold(0.0, f64::max);
-        self.covers_within(equilibrium, moved)
-    }
-
     /// Whether the compliance covers all that `equilibrium` depends on, where the surface has moved by at most `moved`
     /// (m).
     fn covers_within(&self, equilibrium: &Equilibrium, moved: f64) -> bool {

@@ -69,33 +69,14 @@ pub struct AdapterSummary {
     pub hardware: bool,
     /// Largest buffer that one binding reaches (B).
     pub binding_limit: u64,
-    /// Whether shaders may compute in f64: then contact or not is decided on the device, else within a band by the CPU.
-    pub double: bool,
 }
 
-/// Kind of a GPU that is part of a processor.
-const INTEGRATED: &str = "integrated GPU";
-
-/// Invocations that a GPU runs in step, and a software rasteriser.
-const HARDWARE_LANES: u32 = 32;
-const SOFTWARE_LANES: u32 = 8;
-
 impl AdapterSummary {
-    /// Invocations of a workgroup that has one configuration.
-    pub(super) fn lanes(&self) -> u32 {
-        if self.hardware { HARDWARE_LANES } else { SOFTWARE_LANES }
-    }
-
-    /// Whether it has no memory but the host's.
-    pub(super) fn is_integrated(&self) -> bool {
-        self.kind == INTEGRATED
-    }
-
     fn of(adapter: &wgpu::Adapter) -> Self {
         let info = adapter.get_info();
         let kind = match info.device_type {
             wgpu::DeviceType::DiscreteGpu => "discrete GPU",
-            wgpu::DeviceType::IntegratedGpu => INTEGRATED,
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
             wgpu::DeviceType::VirtualGpu => "virtual GPU",
             wgpu::DeviceType::Cpu => "software",
             wgpu::DeviceType::Other => "unknown",
@@ -108,7 +89,6 @@ impl AdapterSummary {
             kind,
             hardware: preference(info.device_type) < preference(wgpu::DeviceType::Other),
             binding_limit: adapter.limits().max_storage_buffer_binding_size,
-            double: adapter.features().contains(wgpu::Features::SHADER_F64),
         }
     }
 
@@ -229,7 +209,6 @@ mod tests {
             kind: if hardware { "discrete GPU" } else { "software" },
             hardware,
             binding_limit: 1 << 27,
-            double: true,
         }
     }
 

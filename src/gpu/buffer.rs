@@ -3,11 +3,6 @@
 use super::{context::Context, error::GpuError};
 use bytemuck::Pod;
 
-/// Every byte of an output before the dispatch that writes it. As u32 it is no status, count or node number in use; as
-/// f32 it is -1.2e13, no length, force or energy of a haptic scene.
-#[cfg(test)]
-pub const POISON: u8 = 0xD5;
-
 /// A buffer on the device that kernels bind and the host fills and reads.
 pub struct StorageBuffer {
     pub(super) raw: wgpu::Buffer,
@@ -74,13 +69,6 @@ impl StorageBuffer {
         if !values.is_empty() {
             context.queue.write_buffer(&self.raw, 0, bytemuck::cast_slice(values));
         }
-    }
-
-    /// Fills the first `bytes` bytes with [`POISON`], before the next submission.
-    #[cfg(test)]
-    pub fn poison(&self, context: &Context, bytes: u64) {
-        let bytes = usize::try_from(bytes.min(self.size())).unwrap_or(usize::MAX) / 4 * 4;
-        context.queue.write_buffer(&self.raw, 0, &vec![POISON; bytes]);
     }
 
     /// Records that the first `bytes` bytes become zero.

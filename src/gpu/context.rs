@@ -7,9 +7,10 @@
 use super::{
     adapter::{AdapterChoice, AdapterSummary, asked_for, instance, qualified},
     compiled::Compiled,
+    device::MOST_WORKGROUP_MEMORY,
     dispatch::Dispatch,
     error::GpuError,
-    timing::{KernelTime, SearchCounts, Stopwatch},
+    timing::{KernelTime, Stopwatch},
 };
 use std::{
     collections::HashMap,
@@ -40,7 +41,6 @@ pub struct Context {
     opened: wgpu::Adapter,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    choice: AdapterChoice,
     adapter: AdapterSummary,
     failures: Arc<Mutex<Failures>>,
     /// Where kernels are timed.
@@ -76,7 +76,7 @@ impl Context {
         let instance = instance();
         let mut refusal = None;
         for (adapter, summary) in qualified(&instance, &choice)? {
-            match Self::open_on(&instance, &adapter, summary, choice.clone(), timed) {
+            match Self::open_on(&instance, &adapter, summary, timed) {
                 Ok(context) => return Ok(context),
                 Err(error) => refusal = refusal.or(Some(error)),
             }
@@ -85,7 +85,6 @@ impl Context {
     }
 
     /// Opens all adapters that qualify and are named by the environment or, if it names none, those of the best kind.
-    /// Each is reopened as itself.
     ///
     /// # Errors
     /// As [`Context::open`], and where one that is named gives no device.
@@ -97,8 +96,7 @@ impl Context {
             if !summary.joins(opened.iter().map(|context| &context.adapter), named) {
                 continue;
             }
-            let own = AdapterChoice::This(summary.clone());
-            match Self::open_on(&instance, &adapter, summary, own, false) {
+            match Self::open_on(&instance, &adapter, summary, false) {
                 Ok(context) => opened.push(Arc::new(context)),
                 Err(error) if named => return Err(error),
                 Err(error) => refusal = refusal.or(Some(error)),
@@ -111,24 +109,23 @@ impl Context {
         instance: &wgpu::Instance,
         adapter: &wgpu::Adapter,
         summary: AdapterSummary,
-        choice: AdapterChoice,
         timed: bool,
     ) -> Result<Self, GpuError> {
         let clock = if timed { wgpu::Features::TIMESTAMP_QUERY } else { wgpu::Features::empty() };
         if !adapter.features().contains(clock) {
             return Err(GpuError::NoClock(summary.to_string()));
         }
-        let double = adapter.features() & wgpu::Features::SHADER_F64;
         let offered = adapter.limits();
-        // WebGPU's defaults, which every device has, but for the two sizes that decide which objects fit.
+        // WebGPU's defaults, which every device has, but for the sizes that decide which objects and contacts fit.
         let limits = wgpu::Limits {
+            max_compute_workgroup_storage_size: offered.max_compute_workgroup_storage_size.min(MOST_WORKGROUP_MEMORY),
             max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
             max_buffer_size: offered.max_buffer_size,
             ..wgpu::Limits::default()
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("haptize"),
-            required_features: clock | double,
+            required_features: clock,
             required_limits: limits,
             ..Default::default()
         };
@@ -149,20 +146,11 @@ impl Context {
             opened: adapter.clone(),
             device,
             queue,
-            choice,
             adapter: summary,
             failures,
             stopwatch: timed.then(Stopwatch::default),
             compiled: Mutex::default(),
         })
-    }
-
-    /// A new device by the same choice: what is left to do once this one is lost.
-    ///
-    /// # Errors
-    /// As [`Context::open`].
-    pub fn reopen(&self) -> Result<Self, GpuError> {
-        Self::open_with(self.choice.clone(), self.stopwatch.is_some())
     }
 
     /// The adapter in use.
@@ -182,6 +170,12 @@ impl Context {
     pub fn binding_limit(&self) -> u64 {
         let limits = self.device.limits();
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+
+    /// Workgroup memory that a kernel may have (B).
+    #[must_use]
+    pub(super) fn workgroup_memory(&self) -> u32 {
+        self.device.limits().max_compute_workgroup_storage_size
     }
 
     /// The failure that a callback stored, if any. A lost device stays lost; another error is reported once.
@@ -266,12 +260,6 @@ impl Context {
         }
         let mut pass = encoder.begin_compute_pass(&Default::default());
         dispatches.into_iter().for_each(|dispatch| dispatch.record(&mut pass));
-    }
-
-    /// Returns what searches took since the last call; zeros where kernels are not timed.
-    #[must_use]
-    pub fn search_counts(&self) -> SearchCounts {
-        self.stopwatch.as_ref().map_or_else(SearchCounts::default, Stopwatch::take_counts)
     }
 
     /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where

@@ -59,10 +59,10 @@ pub enum GpuError {
         "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
     )]
     NoClock(String),
-    /// The kernels take contact with the deformed surface alone, by the energy form.
+    /// The kernel takes contact with the surface at rest alone.
     #[error(
-        "the GPU does not solve contact by the algorithm {0}. Use --backend cpu, or geometry = \"following\" in \
-         [contact]"
+        "the GPU solves contact with the surface at rest, not by the algorithm {0}. Use --geometry rest, or \
+         --backend cpu"
     )]
     Algorithm(&'static str),
     /// Outputs that no invocation wrote: a dispatch was cut short.

@@ -32,7 +32,7 @@ impl Kernel {
         };
         // The lock is held meanwhile, so that of two threads that want one kernel the second gets the first's.
         let mut compiled = context.compiled.lock().unwrap_or_else(PoisonError::into_inner);
-        let key = format!("{name} {:?} {overrides:?}", shader.precision);
+        let key = format!("{name} {overrides:?}");
         let compiled = match compiled.get(&key) {
             Some(compiled) => compiled.clone(),
             None => compiled.entry(key).insert_entry(Self::compile(context, shader, overrides)?).get().clone(),

@@ -4,12 +4,15 @@
 //! origin.
 
 use super::{
-    buffer::StorageBuffer, context::Context, error::GpuError, layout::Parameters, precision::Precision,
-    shaders::GPU_FAR_AWAY,
+    buffer::StorageBuffer,
+    context::Context,
+    error::GpuError,
+    layout::Parameters,
+    shaders::{DIFFERENCE_STEP, GPU_FAR_AWAY, MOST_CARRIERS},
 };
 use crate::{
-    contact::{self, geometry::bounding_volumes::CULLING_SLACK},
-    proxy,
+    contact,
+    proxy::Chain,
     scene::{Algorithm, JointKind},
 };
 use glam::DVec3;
@@ -27,115 +30,151 @@ const GPU_GAP_BAND_PER_JOINT: f64 = 4e-7;
 /// far away) are rounded to f32 by 6e-8 each.
 const GPU_BOUND_SLACK: f64 = 1e-6;
 
-/// Gaps at rest up to which they are all known, relative to the object's extent (1): what comes into contact as the
-/// surface moves was hardly farther. Where it was the closest facet takes longer to find, no more.
-const KNOWN_PER_EXTENT: f64 = 0.25;
+/// Distance of a node to an edge or vertex, relative to the object's extent, below which f32 does not resolve the
+/// direction between them (1): coordinates of one extent carry 6e-8, and 16 times that gives a direction good to 6 %,
+/// where the pseudonormal is the better one.
+const GPU_LEAST_DISTANCE_PER_EXTENT: f64 = 1e-6;
 
-/// Greatest contact stiffness of the energy form in f32, in units of the stiffness of the object's softest node (1): a
-/// depth is known to about 1e-6 of the object's displacement, a force to this many times that. What is stiffer is
-/// stiffened from there in f64, where nothing moves by more than a thousandth of its displacement.
-const GPU_STIFFNESS: f64 = 1e3;
+/// Most rounds of a program (1): ten times what the stiffest of the tests' scenes takes. What does not end is left to
+/// the CPU.
+const GPU_ROUNDS: u32 = 100;
 
-/// The device's copy of arm and surface at rest.
-pub struct DeviceModel {
-    pub(super) precision: Precision,
+/// Places that no covered node has: those of nodes that the compliance leaves out, and those behind a facet's last.
+const UNCOVERED: u32 = u32::MAX - 1;
+const ABSENT: u32 = u32::MAX;
+
+/// The device's copy of a contact model.
+pub(super) struct RestModel {
     /// Without the configurations, which each dispatch sets.
-    pub(super) parameters: Parameters,
-    pub(super) chain: StorageBuffer,
-    /// The flat triangles in f32: see `shaders/detection.wgsl`.
-    pub(super) rest: StorageBuffer,
-    pub(super) mesh: StorageBuffer,
-    /// The facets in the order of the tree of bounding spheres.
-    pub(super) order: StorageBuffer,
-    /// The contact surface: see `shaders/gap.wgsl`.
-    pub(super) surface: StorageBuffer,
-    /// Whether its facets are bent.
-    pub(super) is_smooth: bool,
-    /// Gaps in f32, to the flat triangles, are those to the contact surface but for this (m).
-    pub(super) gap_band: f64,
-    /// Gaps to the contact surface no farther than this from zero are left open (m).
-    pub(super) open_band: f64,
+    pub parameters: Parameters,
+    pub chain: StorageBuffer,
+    pub surface: StorageBuffer,
+    pub mesh: StorageBuffer,
+    pub compliance: StorageBuffer,
 }
 
-/// Contact stiffness of the energy form in f32 (N/m); what is stiffer is stiffened when the result is settled in f64.
-pub(super) fn stiffness(model: &contact::Model<'_>) -> f64 {
-    model.kc.min(GPU_STIFFNESS / model.max_nodal_compliance)
-}
-
-impl DeviceModel {
-    /// Uploads a model, for stages that compute in `precision`.
+impl RestModel {
+    /// Uploads a model.
     ///
     /// # Errors
-    /// When a buffer exceeds the device's limits or memory.
-    pub fn new(context: &Context, model: &contact::Model<'_>, precision: Precision) -> Result<Self, GpuError> {
-        let contact::Model { object, chain, contact, .. } = model;
-        if contact.algorithm != Algorithm::Energy {
-            return Err(GpuError::Algorithm(contact.algorithm.name()));
+    /// [`GpuError::Algorithm`] where contact is not at rest, and when a buffer exceeds the device's limits or memory.
+    pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
+        if model.contact.algorithm != Algorithm::Rest {
+            return Err(GpuError::Algorithm(model.contact.algorithm.name()));
         }
-        let extent = extent(model);
-        let rounding = GPU_GAP_BAND_PER_EXTENT * extent
-            + GPU_GAP_BAND_PER_JOINT * chain.joints.len() as f64 * reach(chain, model.surface.centre);
-        // A smooth surface stands off the flat triangles.
-        let gap_band = model.surface.bulge + rounding;
-        let order = leaves(model);
-        let numbers = |what, numbers: &[f64]| StorageBuffer::from_slice(context, what, &precision.encode(numbers));
+        let Parts { parameters, surface, mesh } = Parts::new(model);
+        let surface: Vec<[f32; 4]> = surface.into_iter().map(|row| row.map(|number| number as f32)).collect();
+        // Rounded one by one: each keeps 24 bits, whatever the condition number of K.
+        let compliance: Vec<f32> = model.compliance.entries.iter().map(|&entry| entry as f32).collect();
         Ok(Self {
-            precision,
-            parameters: Parameters {
-                configurations: 0,
-                joints: chain.joints.len() as u32,
-                proxy_nodes: chain.nodes.len() as u32,
-                surface_nodes: object.surface_nodes as u32,
-                triangles: object.triangles.len() as u32,
-                leaves: order.len() as u32,
-                gap_band: (gap_band as f32).next_up(),
-                known_to: (KNOWN_PER_EXTENT * extent) as f32,
-            },
-            chain: numbers("chain", &joints_and_nodes(model))?,
-            rest: StorageBuffer::from_slice(context, "surface at rest", &rest(model, extent))?,
-            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh(model))?,
-            order: StorageBuffer::from_slice(context, "order of the facets", &order)?,
-            surface: numbers("contact surface", surface(model, precision).as_flattened())?,
-            is_smooth: model.surface.smooth.is_some(),
-            gap_band,
-            open_band: if precision == Precision::Double { 0.0 } else { rounding },
+            parameters,
+            chain: StorageBuffer::from_slice(context, "chain", &chain(model))?,
+            surface: StorageBuffer::from_slice(context, "contact surface", &surface)?,
+            mesh: StorageBuffer::from_slice(context, "surface mesh", &mesh)?,
+            compliance: StorageBuffer::from_slice(context, "compliance", &compliance)?,
         })
     }
-
-    /// Size of what the proxy is tested against for contact at rest: of the flat triangles, and of the contact surface
-    /// (B).
-    pub(super) fn surface_bytes(&self) -> [u64; 2] {
-        [self.rest.size() + self.mesh.size() + self.order.size(), self.surface.size()]
-    }
 }
 
-/// Greatest distance of a surface node to the object's centre (m).
-pub(super) fn extent(model: &contact::Model<'_>) -> f64 {
-    model.surface.positions.iter().map(|n| n.length()).fold(0.0, f64::max)
+/// Returns what a gap in f32 may be off by (m).
+pub(super) fn gap_band(model: &contact::Model<'_>) -> f64 {
+    let joints = model.chain.joints.len() as f64;
+    GPU_GAP_BAND_PER_EXTENT * model.surface.extent
+        + GPU_GAP_BAND_PER_JOINT * joints * reach(model.chain, model.surface.centre)
 }
 
-/// Returns the margin of bounding spheres, for stages that compute in `precision` (m).
-pub(super) fn culling_slack(model: &contact::Model<'_>, precision: Precision) -> f64 {
-    match precision {
-        Precision::Single => GPU_BOUND_SLACK * extent(model),
-        Precision::Double => CULLING_SLACK * model.surface.extent,
+/// The contents of the buffers of the surface, and where their parts begin.
+struct Parts {
+    parameters: Parameters,
+    surface: Vec<[f64; 4]>,
+    mesh: Vec<u32>,
+}
+
+impl Parts {
+    fn new(model: &contact::Model<'_>) -> Self {
+        let (object, surface) = (model.object, &model.surface);
+        let triangles = object.triangles.len() as u32;
+        let facets = 0..triangles;
+        let carriers = facets.clone().map(|t| surface.carriers(t).0.len()).max().unwrap_or(0).div_ceil(4);
+        let carriers = carriers.clamp(1, MOST_CARRIERS as usize / 4);
+        let order = leaves(model);
+        let mut numbers = bounding_spheres(model, order.len());
+        let at_controls = numbers.len() as u32;
+        numbers.extend(facets.clone().flat_map(|t| controls(model, t)).map(|point| four(point, 0.0)));
+        let at_masks = numbers.len() as u32;
+        let shapes = surface.smooth.iter().flat_map(|smooth| smooth.shapes());
+        for mask in shapes.flat_map(|shape| (0..4 * carriers).map(|j| shape.mask_of(j))) {
+            let fours = mask.chunks(4).map(|part| std::array::from_fn(|k| part.get(k).copied().unwrap_or(0.0)));
+            numbers.extend(fours);
+        }
+        let at_cubes = numbers.len() as u32;
+        let bounds = surface.distance_bounds();
+        numbers.extend(bounds.cubes().map(|(gradient, constant, _)| four(gradient.as_dvec3(), constant.into())));
+        let mut mesh: Vec<u32> = object.triangles.iter().chain(&object.topology.across).flatten().copied().collect();
+        mesh.extend(&object.topology.around_offsets);
+        mesh.extend(&object.topology.around);
+        let at_order = mesh.len() as u32;
+        mesh.extend(order.iter());
+        let at_carriers = mesh.len() as u32;
+        let place = |node: &u32| model.compliance.place(*node).map_or(UNCOVERED, |place| place as u32);
+        for t in facets.clone() {
+            let places = surface.carriers(t).0.iter().map(place);
+            mesh.extend(places.chain(std::iter::repeat(ABSENT)).take(4 * carriers));
+        }
+        let at_shapes = mesh.len() as u32;
+        mesh.extend(surface.smooth.iter().flat_map(|smooth| facets.clone().map(|t| smooth.shape_number(t))));
+        let at_near = mesh.len() as u32;
+        mesh.extend(bounds.cubes().map(|(.., triangle)| triangle));
+        let (low, inverse_side, counts) = bounds.lattice();
+        let parameters = Parameters {
+            configurations: 0,
+            joints: model.chain.joints.len() as u32,
+            proxy_nodes: model.chain.nodes.len() as u32,
+            surface_nodes: object.surface_nodes as u32,
+            triangles,
+            leaves: order.len() as u32,
+            covered: model.compliance.nodes.len() as u32,
+            carriers: carriers as u32,
+            at_controls,
+            at_masks,
+            at_cubes,
+            at_order,
+            at_carriers,
+            at_shapes,
+            at_near,
+            cubes_x: counts[0] as u32,
+            cubes_y: counts[1] as u32,
+            cubes_z: counts[2] as u32,
+            low_x: low.x as f32,
+            low_y: low.y as f32,
+            low_z: low.z as f32,
+            inverse_side: inverse_side as f32,
+            bulge: surface.bulge as f32,
+            band: gap_band(model) as f32,
+            softness: model.kc.recip() as f32,
+            mobility: (model.mobility.sqrt() + model.bulge_mobility.sqrt()) as f32,
+            least_distance: (GPU_LEAST_DISTANCE_PER_EXTENT * surface.extent) as f32,
+            step: (f64::from(DIFFERENCE_STEP) * surface.mean_edge) as f32,
+            rounds: GPU_ROUNDS.min(model.contact.max_iterations),
+        };
+        Self { parameters, surface: numbers, mesh }
     }
 }
 
 /// Three coordinates, and a fourth number.
-pub(super) fn four(v: DVec3, fourth: f64) -> [f64; 4] {
+fn four(v: DVec3, fourth: f64) -> [f64; 4] {
     [v.x, v.y, v.z, fourth]
 }
 
 /// A sphere around `points`, widened by `slack`: centre and radius (m).
-pub(super) fn sphere_around(points: &[DVec3], slack: f64) -> [f64; 4] {
+fn sphere_around(points: &[DVec3], slack: f64) -> [f64; 4] {
     let centre = points.iter().sum::<DVec3>() / points.len() as f64;
     let radius = points.iter().map(|point| point.distance(centre)).fold(0.0, f64::max);
     four(centre, radius + slack)
 }
 
 /// Distance from the object's centre that no proxy node ever exceeds (m).
-fn reach(chain: &proxy::Chain, centre: DVec3) -> f64 {
+fn reach(chain: &Chain, centre: DVec3) -> f64 {
     let mut length = 0.0;
     let lengths: Vec<f64> = (chain.joints.iter().enumerate())
         .map(|(k, joint)| {
@@ -148,32 +187,12 @@ fn reach(chain: &proxy::Chain, centre: DVec3) -> f64 {
             length
         })
         .collect();
-    let tip = |node: &proxy::Node| lengths[node.link] + node.position.length();
-    chain.nodes.iter().map(tip).fold(0.0, f64::max)
+    chain.nodes.iter().map(|node| lengths[node.link] + node.position.length()).fold(0.0, f64::max)
 }
 
-/// Bounding spheres of the flat triangles, radii of the proxy nodes and surface nodes: see `shaders/detection.wgsl`.
-fn rest(model: &contact::Model<'_>, extent: f64) -> Vec<[f32; 4]> {
-    let corners = |t: u32| model.object.triangles[t as usize].map(|j| model.surface.positions[j as usize]).to_vec();
-    let mut numbers = tree(model, corners, GPU_BOUND_SLACK * extent);
-    numbers.extend(model.chain.nodes.iter().map(|node| [node.radius, 0.0, 0.0, 0.0]));
-    numbers.extend(model.surface.positions.iter().map(|&node| four(node, 0.0)));
-    numbers.into_iter().map(|row| row.map(|number| number as f32)).collect()
-}
-
-/// Corners, neighbours, and lists around nodes: see `shaders/mesh.wgsl`.
-pub(super) fn mesh(model: &contact::Model<'_>) -> Vec<u32> {
-    let (object, topology) = (model.object, &model.object.topology);
-    let mut mesh: Vec<u32> = object.triangles.iter().flatten().copied().collect();
-    mesh.extend(topology.across.iter().flatten());
-    mesh.extend(&topology.around_offsets);
-    mesh.extend(&topology.around);
-    mesh
-}
-
-/// Origin, axis and kind of each joint, the first origin relative to the object's centre; position and link of each
-/// proxy node.
-pub(super) fn joints_and_nodes(model: &contact::Model<'_>) -> Vec<f64> {
+/// Origin, axis and kind of each joint, the first origin relative to the object's centre; position, link, radius and
+/// share of stiffness of each proxy node.
+fn chain(model: &contact::Model<'_>) -> Vec<f32> {
     let mut numbers = Vec::new();
     for (k, joint) in model.chain.joints.iter().enumerate() {
         let origin = if k == 0 { joint.origin - model.surface.centre } else { joint.origin };
@@ -181,52 +200,38 @@ pub(super) fn joints_and_nodes(model: &contact::Model<'_>) -> Vec<f64> {
         numbers.extend(joint.axis.to_array());
         numbers.push(f64::from(u8::from(joint.kind == JointKind::Prismatic)));
     }
-    for node in &model.chain.nodes {
+    for (node, share) in model.chain.nodes.iter().zip(&model.shares) {
         numbers.extend(node.position.to_array());
-        numbers.push(node.link as f64);
+        numbers.extend([node.link as f64, node.radius, *share]);
     }
-    numbers
+    numbers.into_iter().map(|number| number as f32).collect()
 }
 
 /// The control points of facet `t` at rest, of a flat one its corners (m).
-pub(super) fn controls(model: &contact::Model<'_>, t: u32) -> Vec<DVec3> {
+fn controls(model: &contact::Model<'_>, t: u32) -> Vec<DVec3> {
     let facet = model.surface.facet_at_rest(t);
     facet.net.map_or_else(|| facet.corners.to_vec(), |net| net.to_vec())
 }
 
 /// The facets in an order in which neighbours are near each other, the last one as often as makes a power of two.
-pub(super) fn leaves(model: &contact::Model<'_>) -> Vec<u32> {
+fn leaves(model: &contact::Model<'_>) -> Vec<u32> {
     let mut order: Vec<u32> = model.surface.bounds.order().collect();
     order.resize(order.len().next_power_of_two(), order.last().copied().unwrap_or(0));
     order
 }
 
-/// Spheres around the `points` of the facets, none of which lies outside these, widened by `slack` (m): centre and
-/// radius of each node of the tree of `shaders/bounding_spheres.wgsl`.
-fn tree(model: &contact::Model<'_>, points: impl Fn(u32) -> Vec<DVec3>, slack: f64) -> Vec<[f64; 4]> {
+/// Spheres around the control points of the facets: centre and radius of each node of the tree of
+/// `shaders/closest_facet.wgsl`, which has so many leaves.
+fn bounding_spheres(model: &contact::Model<'_>, leaves: usize) -> Vec<[f64; 4]> {
     let order: Vec<u32> = model.surface.bounds.order().collect();
-    let leaves = order.len().next_power_of_two();
+    let slack = GPU_BOUND_SLACK * model.surface.extent;
     let nowhere = [0.0, 0.0, 0.0, -f64::from(GPU_FAR_AWAY)];
     let sphere = |node: usize| {
         let level = node.ilog2();
         let under = leaves >> level;
         let facets = order.iter().skip((node - (1 << level)) * under).take(under);
-        let points: Vec<DVec3> = facets.flat_map(|&t| points(t)).collect();
+        let points: Vec<DVec3> = facets.flat_map(|&t| controls(model, t)).collect();
         if points.is_empty() { nowhere } else { sphere_around(&points, slack) }
     };
     std::iter::once(nowhere).chain((1..2 * leaves).map(sphere)).collect()
-}
-
-/// The tree of the contact surface.
-pub(super) fn bounding_spheres(model: &contact::Model<'_>, precision: Precision) -> Vec<[f64; 4]> {
-    tree(model, |t| controls(model, t), culling_slack(model, precision))
-}
-
-/// Bounding spheres, radii of proxy nodes and control points: see `shaders/gap.wgsl`.
-fn surface(model: &contact::Model<'_>, precision: Precision) -> Vec<[f64; 4]> {
-    let mut numbers = bounding_spheres(model, precision);
-    numbers.extend(model.chain.nodes.iter().map(|node| [node.radius, 0.0, 0.0, 0.0]));
-    let facets = 0..model.object.triangles.len() as u32;
-    numbers.extend(facets.flat_map(|t| controls(model, t)).map(|point| four(point, 0.0)));
-    numbers
 }

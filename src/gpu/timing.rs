@@ -4,10 +4,7 @@
 //! is asked for. On any other context nothing of this exists: dispatches that follow each other share one pass.
 
 use super::{dispatch::Dispatch, error::GpuError};
-use std::{
-    ops::Range,
-    sync::{Mutex, PoisonError},
-};
+use std::sync::{Mutex, PoisonError};
 
 /// Time of one kernel, all its dispatches together.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,58 +22,10 @@ pub struct KernelTime {
     pub bytes: u64,
 }
 
-/// What the search took for the configurations in contact, in all rounds: see `shaders/search_types.wgsl`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SearchCounts {
-    /// Configurations.
-    pub configurations: u64,
-    /// Trials: rounds of a configuration.
-    pub trials: u64,
-    /// Proxy nodes that could touch.
-    pub candidates: u64,
-    /// Facets that were measured.
-    pub facets: u64,
-    /// Surface nodes displaced.
-    pub displaced: u64,
-    /// Pairs of these with nodes that carry force.
-    pub displaced_pairs: u64,
-    /// Iterations of linear solves.
-    pub iterations: u64,
-    /// Pairs of nodes that carry force, in products with C: where a state is judged, and where a step is made.
-    pub judged_pairs: u64,
-    /// The same where a step is made.
-    pub stepped_pairs: u64,
-    /// Steps of the eliminations that invert matrices.
-    pub eliminations: u64,
-}
-
-/// The first of the words of a workspace that count, and how many there are.
-pub(super) const COUNTED: Range<usize> = 21..30;
-
-impl SearchCounts {
-    /// Adds the words of one configuration that count.
-    fn add(&mut self, words: [u32; COUNTED.end - COUNTED.start]) {
-        let sums = [
-            &mut self.trials,
-            &mut self.candidates,
-            &mut self.facets,
-            &mut self.displaced,
-            &mut self.displaced_pairs,
-            &mut self.iterations,
-            &mut self.judged_pairs,
-            &mut self.stepped_pairs,
-            &mut self.eliminations,
-        ];
-        sums.into_iter().zip(words).for_each(|(sum, word)| *sum += u64::from(word));
-        self.configurations += 1;
-    }
-}
-
 /// A device's clock, and what it has stamped so far.
 #[derive(Default)]
 pub(super) struct Stopwatch {
     stamped: Mutex<Vec<Stamped>>,
-    counts: Mutex<SearchCounts>,
 }
 
 /// The timed dispatches of one submission.
@@ -91,18 +40,6 @@ struct Stamped {
 const STAMP: u64 = wgpu::QUERY_SIZE as u64;
 
 impl Stopwatch {
-    /// Adds what a search took, from the words of the workspaces, `each` of every configuration.
-    pub fn count(&self, words: &[u32], each: usize) {
-        let mut counts = self.counts.lock().unwrap_or_else(PoisonError::into_inner);
-        let counted = words.chunks_exact(each).filter_map(|words| words.get(COUNTED)?.try_into().ok());
-        counted.for_each(|words| counts.add(words));
-    }
-
-    /// What was counted since the last call.
-    pub fn take_counts(&self) -> SearchCounts {
-        std::mem::take(&mut *self.counts.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
     /// The time of every kernel since the last call, in the order in which they first ran. A tick of the clock takes
     /// `period` (s); `map` waits for the stamps and gives the host a view of them.
     pub fn take_times(
@@ -188,10 +125,10 @@ mod tests {
     use super::*;
     use crate::{
         contact::Model,
-        gpu::{AdapterChoice, BatchCapacity, Context, FrameMethod, FrameUpdate, GpuSolver},
+        gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver},
         object::Object,
         proxy::Chain,
-        scene::{GraphicsEffects, Scene},
+        scene::{Algorithm, ContactSpec, GraphicsEffects, Scene},
         sweep::{Backend, sample},
     };
     use glam::DVec3;
@@ -216,63 +153,25 @@ mod tests {
     }
 
     #[test]
-    fn the_words_that_count_are_those_of_the_shader() {
-        let shader = include_str!("../../shaders/search_types.wgsl");
-        let word = |name: &str| -> usize {
-            let (_, rest) = shader.split_once(&format!("const {name}: u32 = ")).unwrap();
-            rest.split_once("u;").unwrap().0.parse().unwrap()
-        };
-        assert_eq!(COUNTED, word("TRIALS")..word("MEMBER"));
-    }
-
-    #[test]
-    fn every_kernel_of_a_sweep_is_timed_and_none_that_nobody_asks_for() {
+    fn the_kernel_of_a_sweep_is_timed_where_that_is_asked_for() {
         let (scene, contexts) = sphere();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
-        let model = Model::new(&object, &chain, scene.contact);
+        let model = Model::new(&object, &chain, ContactSpec { algorithm: Algorithm::Rest, ..scene.contact });
         let configurations = sample(&scene);
         let [timed, plain] = contexts.map(|context| {
-            let room = BatchCapacity { double: false, ..BatchCapacity::default() };
-            let mut solver = GpuSolver::with_room(Arc::clone(&context), &model, room).unwrap();
+            let mut solver = GpuSolver::new(Arc::clone(&context), &model).unwrap();
             let begin = Instant::now();
             let equilibria = solver.solve(&configurations).unwrap();
             let times = context.kernel_times().unwrap();
             plausible(&times, begin.elapsed().as_secs_f64());
             assert_eq!(context.kernel_times().unwrap(), [], "told twice");
             let results = equilibria.into_iter().map(|e| (e.status, e.torque, e.energy)).collect::<Vec<_>>();
-            (results, times, context.search_counts())
+            (results, times)
         });
         assert_eq!(timed.0, plain.0, "results depend on the clock");
         assert_eq!(plain.1, []);
-        let names: Vec<&str> = timed.1.iter().map(|kernel| kernel.name.as_str()).collect();
-        assert_eq!(
-            names,
-            [
-                "kinematics",
-                "detection",
-                "gap",
-                "search_arm",
-                "search_detect",
-                "search_judge",
-                "search_step",
-                "search_unfinished",
-                "search_results count",
-                "search_results gather",
-            ]
-        );
-        let touching = timed.0.iter().filter(|(status, ..)| *status != crate::contact::Status::Free).count() as u64;
-        let counts = timed.2;
-        assert_eq!(plain.2, SearchCounts::default());
-        assert_eq!(counts.configurations, touching);
-        assert!(counts.trials > 2 * touching && counts.facets > counts.candidates / 2 && counts.candidates > touching);
-        assert!(counts.displaced_pairs > counts.displaced && counts.stepped_pairs > counts.judged_pairs, "{counts:?}");
-        assert!(counts.iterations > touching && counts.eliminations >= counts.iterations / 8, "{counts:?}");
-        // One workgroup a configuration, and for each of its nodes the place is written, then read and written.
-        let [kinematics, detection, _, _, _, search, ..] = &timed.1[..] else { panic!("{names:?}") };
-        assert!(search.workgroups >= touching && touching > 50, "{} for {touching}", search.workgroups);
-        let places = (16 * chain.nodes.len() * configurations.len()) as u64;
-        assert!(kinematics.bytes > places && kinematics.bytes < 2 * places);
-        assert!(detection.bytes > 2 * places);
+        let [kernel] = &timed.1[..] else { panic!("{:?}", timed.1) };
+        assert_eq!((&kernel.name[..], kernel.workgroups), ("rest", configurations.len() as u64));
     }
 
     #[test]

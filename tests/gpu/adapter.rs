@@ -74,7 +74,19 @@ mod twice {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("small.toml"), include_str!("../scenes/small.toml")).unwrap();
         let bake = |named, file: &str| {
-            let arguments = ["bake", "small.toml", "--backend", "gpu", "--measure-error", "0", "--json", "-o", file];
+            let arguments = [
+                "bake",
+                "small.toml",
+                "--backend",
+                "gpu",
+                "--geometry",
+                "rest",
+                "--measure-error",
+                "0",
+                "--json",
+                "-o",
+                file,
+            ];
             let report = json(&program(folder.path(), named, &arguments));
             let dataset = Dataset::open(&folder.path().join(file)).unwrap();
             assert!(report["contact_points"].as_u64().unwrap() > 0);
@@ -102,7 +114,8 @@ mod twice {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("small.toml"), include_str!("../scenes/small.toml")).unwrap();
         for backend in ["auto", "gpu"] {
-            let output = program(folder.path(), "#1,#3", &["bake", "small.toml", "--backend", backend]);
+            let output =
+                program(folder.path(), "#1,#3", &["bake", "small.toml", "--geometry", "rest", "--backend", backend]);
             let said = String::from_utf8(output.stderr).unwrap();
             assert!(!output.status.success() && said.contains("\"#3\"") && !said.contains("\"#1\""), "{said}");
         }

@@ -1,10 +1,11 @@
 //! The device that all tests share, and what they solve.
 
 use haptize::{
+    JointVector,
     gpu::{AdapterChoice, Context},
     object::Object,
     proxy::Chain,
-    scene::{ContactSurface, Material, Scene},
+    scene::{Algorithm, Material, Scene},
 };
 use std::{
     path::Path,
@@ -33,9 +34,24 @@ pub fn load_of(name: &str, material: Option<Material>) -> (Scene, Object, Chain)
         Scene::load(path.unwrap()).unwrap()
     };
     scene.object.material = material.unwrap_or(scene.object.material);
-    // The kernels know the triangles.
-    scene.contact.surface = ContactSurface::Facets;
+    // That is what the kernel solves.
+    scene.contact.algorithm = Algorithm::Rest;
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     (scene, object, chain)
+}
+
+/// Every `stride`-th configuration of the scene's grid, from number `first` on.
+pub fn on_grid(scene: &Scene, first: usize, stride: usize) -> Vec<JointVector> {
+    let axes = &scene.grid.axes;
+    let points: usize = axes.iter().map(|axis| axis.count).product();
+    let configuration = |mut point: usize| {
+        let mut q = JointVector::zeros(axes.len());
+        for (axis, value) in axes.iter().zip(q.iter_mut()).rev() {
+            *value = axis.start + (point % axis.count) as f64 * axis.step;
+            point /= axis.count;
+        }
+        q
+    };
+    (first..points).step_by(stride).map(configuration).collect()
 }

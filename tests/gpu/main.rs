@@ -6,5 +6,4 @@ mod adapter;
 mod equilibria;
 mod fixture;
 mod frames;
-mod search;
 mod stores;

@@ -14,9 +14,8 @@ use haptize::{
 };
 use std::{path::Path, process::Command, time::Instant};
 
-/// Agreement of energies and torques at nodes, over their rms (1): with f64 in shaders both backends solve to 1e-8 and
-/// take the same steps, which differ by rounding.
-const AGREEMENT: f64 = 1e-9;
+/// Agreement of energies and torques at nodes, over their rms (1): f32 places the arm to some 1e-5 of the depths.
+const AGREEMENT: f64 = 1e-4;
 
 /// Rounding of the product of two numbers of a record, which are f32, on either side (1).
 const RECORD_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
@@ -64,8 +63,6 @@ fn a_store_that_the_gpu_fills_is_the_cpus() {
         let width = gpu.records.len().checked_div(gpu.status.len()).unwrap_or(1);
         rows.extend(gpu.records.chunks(width).zip(cpu.records.chunks(width)));
     }
-    // f32 leaves results settled in f64 to a residual: their torques agree to a hundred times that.
-    let owed = if gpu.is_exact() { AGREEMENT } else { 100.0 * haptize::gpu::GPU_SETTLED_RESIDUAL };
     let rms = |k: usize| {
         let squares: f64 = rows.iter().filter_map(|(_, cpu)| felt(cpu).nth(k)).map(|x| x * x).sum();
         (squares / rows.len() as f64).sqrt()
@@ -74,7 +71,7 @@ fn a_store_that_the_gpu_fills_is_the_cpus() {
     assert!(rms.iter().all(|rms| *rms > 0.0), "{rms:?}");
     for (gpu, cpu) in &rows {
         for ((a, b), rms) in felt(gpu).zip(felt(cpu)).zip(&rms) {
-            assert!((a - b).abs() <= owed * rms + RECORD_ROUNDING * b.abs(), "{a:e} for {b:e}, rms {rms:e}");
+            assert!((a - b).abs() <= AGREEMENT * rms + RECORD_ROUNDING * b.abs(), "{a:e} for {b:e}, rms {rms:e}");
         }
     }
 }
@@ -82,10 +79,21 @@ fn a_store_that_the_gpu_fills_is_the_cpus() {
 #[test]
 fn a_refined_bake_names_the_gpu_that_solved() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("small.toml"), include_str!("../scenes/small.toml")).unwrap();
+    let scene =
+        include_str!("../scenes/small.toml").replace("stiffness = 1000.0", "stiffness = 1000.0\ngeometry = \"rest\"");
+    std::fs::write(folder.path().join("small.toml"), scene).unwrap();
     let bake = |backend: &str| -> serde_json::Value {
         let mut program = Command::new(env!("CARGO_BIN_EXE_haptize"));
-        program.current_dir(folder.path()).args(["bake", "small.toml", "--max-error", "5%", "--refine", "2"]);
+        program.current_dir(folder.path()).args([
+            "bake",
+            "small.toml",
+            "--max-error",
+            "5%",
+            "--refine",
+            "2",
+            "--geometry",
+            "rest",
+        ]);
         let output = program.args(["--backend", backend, "--json"]).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice(&output.stdout).unwrap()

@@ -199,16 +199,6 @@ impl EnergySearch {
         SolverStats { residual: self.imbalance, ..outcome }
     }
 
-    /// Takes up `forces` on the object's nodes, for their displacement alone.
-    pub fn hold(&mut self, forces: &[NodeForce]) {
-        self.support.clear();
-        self.state.forces.clear();
-        for &NodeForce { node, force } in forces {
-            self.support.add(node);
-            self.state.forces.extend(force.to_array());
-        }
-    }
-
     /// Takes what the trial's forces lead to for the state.
     fn take_trial(&mut self, model: &Model, detection: &mut Detection) {
         self.evaluate(model, detection);

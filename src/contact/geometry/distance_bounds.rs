@@ -88,6 +88,18 @@ impl DistanceBounds {
         Self { low, inverse_side: side.recip(), counts, cubes: cubes.collect() }
     }
 
+    /// Low corner of the lattice (m), one over a cube's side (1/m), and cubes along each axis.
+    #[must_use]
+    pub fn lattice(&self) -> (DVec3, f64, [usize; 3]) {
+        (self.low, self.inverse_side, self.counts)
+    }
+
+    /// Of each cube, the last axis fastest: gradient of the bound (1), the bound at the model's centre (m), and the
+    /// triangle closest to the middle.
+    pub fn cubes(&self) -> impl Iterator<Item = (Vec3, f32, u32)> {
+        self.cubes.iter().map(|cube| (cube.gradient, cube.constant, cube.triangle))
+    }
+
     /// A lower bound of the signed distance of `x` to the surface (m), and a triangle near by; `None` where there are
     /// no cubes.
     #[inline]

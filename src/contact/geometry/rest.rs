@@ -88,6 +88,12 @@ impl<'a> RestSurface<'a> {
         surface
     }
 
+    /// Bounds on the distance to the flat triangles.
+    #[must_use]
+    pub(crate) fn distance_bounds(&self) -> &DistanceBounds {
+        &self.distance_bounds
+    }
+
     /// A lower bound of the signed distance of `x`, and a triangle near by, if one is known (m).
     #[inline]
     #[must_use]

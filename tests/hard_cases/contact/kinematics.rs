@@ -1,7 +1,7 @@
 //! Arms in singular postures, at their limits, with axes that coincide: contact sees where the nodes are and nothing
 //! else.
 
-use super::processor::{Processor, processors};
+use super::processor::{IN_F32, processors};
 use crate::{Bound, CaseResult, Failure, Setting};
 use glam::DVec3;
 use haptize::fixtures::bodies::{PAPER, contact, joint, sphere};
@@ -56,7 +56,7 @@ pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
             let mut touching = 0;
             for stiffness in [1e2, 1e4] {
                 let [plain, singular] = [&reference, &arm].map(|chain| Model::new(&object, chain, contact(stiffness)));
-                let expected = Processor::cpu().solve(&plain, &angles.map(|q| JointVector::from_slice(&[q])))?;
+                let expected = processor.reference().solve(&plain, &angles.map(|q| JointVector::from_slice(&[q])))?;
                 for (expected, found) in expected.iter().zip(processor.solve(&singular, &postures)?) {
                     touching += usize::from(!expected.touches.is_empty());
                     if expected.status != found.status || expected.forces.len() != found.forces.len() {
@@ -76,7 +76,7 @@ pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
                 varied: processor.name(name),
                 measure: "forces and torque against a plain arm's, relative [1]".into(),
                 worst,
-                bound: Bound::AtMost(processor.choose(1e-6, 1e-5)),
+                bound: Bound::AtMost(processor.choose(1e-6, IN_F32)),
                 note: processor.note(format!("{touching} in contact")),
             });
         }

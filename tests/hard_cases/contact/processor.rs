@@ -1,19 +1,24 @@
-//! Who solves a case's configurations: the CPU, and the GPU.
+//! Who solves a case's configurations: the CPU, before the deformed surface, and the GPU, before the surface at rest.
 
 use crate::Setting;
 use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver},
     gpu::{Context, GpuError, GpuSolver},
+    scene::{Algorithm, ContactSpec},
     sweep::Backend,
 };
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Agreement of results in f32 (1): the arm is placed to some 5e-8 m, of depths of a millimetre.
+pub const IN_F32: f64 = 1e-4;
+
 /// One of them, and what it has done.
 pub struct Processor<'a> {
     /// The GPU; absent: the CPU.
     gpu: Option<&'a Arc<Context>>,
+    law: Algorithm,
     solved: usize,
     left_to_cpu: usize,
 }
@@ -28,12 +33,17 @@ pub fn processors(setting: &Setting) -> Vec<Processor<'_>> {
 impl<'a> Processor<'a> {
     /// All cores.
     pub fn cpu() -> Self {
-        Self { gpu: None, solved: 0, left_to_cpu: 0 }
+        Self { gpu: None, law: Algorithm::Energy, solved: 0, left_to_cpu: 0 }
     }
 
     /// An adapter.
     pub fn gpu(context: &'a Arc<Context>) -> Self {
-        Self { gpu: Some(context), ..Self::cpu() }
+        Self { gpu: Some(context), law: Algorithm::Rest, ..Self::cpu() }
+    }
+
+    /// The CPU by the same law.
+    pub fn reference(&self) -> Self {
+        Self { law: self.law, ..Self::cpu() }
     }
 
     /// One figure for the CPU, one for the GPU.
@@ -52,6 +62,7 @@ impl<'a> Processor<'a> {
     /// Those of the GPU.
     pub fn solve(&mut self, model: &Model<'_>, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
         self.solved += configurations.len();
+        let model = &model.with_contact(ContactSpec { algorithm: self.law, ..model.contact });
         let Some(context) = self.gpu else {
             let solve = |solver: &mut Solver<'_>, q: &JointVector| solver.solve(q);
             return Ok(configurations.par_iter().map_init(|| Solver::new(model), solve).collect());

@@ -1,6 +1,6 @@
 //! Units and places of the world that must not matter: lengths in millimetres, an object a kilometre from the origin.
 
-use super::processor::{Processor, processors};
+use super::processor::{IN_F32, Processor, processors};
 use crate::{Bound, CaseResult, Failure, Setting};
 use glam::DVec3;
 use haptize::fixtures::bodies::{PAPER, RADIUS, contact, floating_bar, joint, pressed, sphere, sphere_spec};
@@ -64,14 +64,21 @@ pub fn units(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
                 let configurations = pressed(&model, 5, 40, 0.0, DEPTH);
                 let mut elsewhere = configurations.clone();
                 elsewhere.iter_mut().for_each(|q| q[..3].iter_mut().for_each(|x| *x *= scale));
-                let expected = Processor::cpu().solve(&model, &configurations)?;
+                let expected = processor.reference().solve(&model, &configurations)?;
                 let found = processor.solve(&other, &elsewhere)?;
                 // Slides give forces, which stay; turns give torques.
                 worst = worst.max(difference(&expected, &found, scale, |k| if k < 3 { 1.0 } else { scale }));
             }
             let measure = "U and tau scaled back, relative [1]";
             let note = processor.note("points and balls, Kc 1e3".into());
-            outcomes.push(outcome("units", &processor.name(name), measure, worst, processor.choose(bound, 1e-5), note));
+            outcomes.push(outcome(
+                "units",
+                &processor.name(name),
+                measure,
+                worst,
+                processor.choose(bound, IN_F32),
+                note,
+            ));
         }
     }
     Ok(outcomes)
@@ -108,17 +115,17 @@ pub fn far_away(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
             }
         }
         let (case, measure) = ("far from the origin", "U and tau against those at it, relative [1]");
-        let expected = Processor::cpu().solve(&models[0], &configurations)?;
         let trials = [
             ("1 km away", &models[1], Processor::cpu()),
             ("at the origin", &models[0], Processor::gpu(&setting.gpu)),
             ("1 km away", &models[1], Processor::gpu(&setting.gpu)),
         ];
         for (place, model, mut processor) in trials {
+            let expected = processor.reference().solve(&models[0], &configurations)?;
             let found = processor.solve(model, &configurations)?;
             let worst = difference(&expected, &found, 1.0, |_| 1.0);
             let varied = processor.name(&format!("{place}, {name}"));
-            let bound = processor.choose(1e-6, 1e-5);
+            let bound = processor.choose(1e-6, IN_F32);
             outcomes.push(outcome(case, &varied, measure, worst, bound, processor.note(String::new())));
         }
     }
