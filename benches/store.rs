@@ -72,7 +72,7 @@ fn dense(grid: &Grid, levels: u32) -> Store {
     let joints = grid.joints();
     let space = Space::new(grid, levels).unwrap();
     let blocks: Vec<Vec<Place>> = (0..levels).map(|level| places(&space, level)).collect();
-    let store = Store::new(space.clone(), blocks.iter().map(Vec::len).sum());
+    let mut store = Store::new(space.clone());
     let normal = 1.0 / (joints as f64).sqrt();
     for (level, blocks) in (0..).zip(&blocks) {
         for block in blocks {

@@ -35,6 +35,10 @@ const TICKS: u32 = 100_000;
 /// Scenes that ship and are solved.
 const SCENES: [&str; 7] = ["sphere", "mesh", "nodule", "organ", "touch", "woodenhaptics", "two_diy"];
 
+/// Sessions that are the same, tick by tick, of which the least time of each tick counts: interrupts, and what others do
+/// to the caches, only add to it.
+const TURNS: usize = 3;
+
 /// Contact nodes of the arm that is a mesh, all round its last link (1).
 const MESH_NODES: usize = 2500;
 
@@ -75,18 +79,24 @@ fn live(name: &str, text: &str, path: &Path) {
     let (mut costs, mut touched, mut unsolved, mut most) = (Vec::new(), 0, 0, 0);
     for way in [&setup.scene.motion.press, &setup.scene.motion.scrape] {
         let motion = Motion::through(way, joints).unwrap();
-        let mut state = setup.haptics.start(&motion.at(0.0).0).unwrap();
-        let mut contact = setup.haptics.source().begin();
-        for k in 0..(1e3 * motion.duration()) as usize {
-            let (position, _) = motion.at(1e-3 * k as f64);
-            let inputs = Inputs { position, age: 0.0, elapsed: 1e-3, interval: 1e-3 };
-            let before = processor_time();
-            let output = setup.haptics.tick_with(&mut state, &inputs, &mut contact);
-            costs.push(processor_time() - before);
-            touched += usize::from(output.sample.contact);
-            unsolved += usize::from(output.sample.flags.contains(Flags::UNCONVERGED));
-            most = most.max(output.sample.contact_nodes);
+        let mut least = vec![f64::MAX; (1e3 * motion.duration()) as usize];
+        for turn in 0..TURNS {
+            let mut state = setup.haptics.start(&motion.at(0.0).0).unwrap();
+            let mut contact = setup.haptics.source().begin();
+            for (k, least) in least.iter_mut().enumerate() {
+                let (position, _) = motion.at(1e-3 * k as f64);
+                let inputs = Inputs { position, age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+                let before = processor_time();
+                let output = setup.haptics.tick_with(&mut state, &inputs, &mut contact);
+                *least = least.min(processor_time() - before);
+                if turn == 0 {
+                    touched += usize::from(output.sample.contact);
+                    unsolved += usize::from(output.sample.flags.contains(Flags::UNCONVERGED));
+                    most = most.max(output.sample.contact_nodes);
+                }
+            }
         }
+        costs.extend(least);
     }
     costs.sort_by(f64::total_cmp);
     let [median, rare, greatest] = [0.5, 0.999, 1.0].map(|share| costs[((costs.len() - 1) as f64 * share) as usize]);

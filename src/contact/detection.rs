@@ -20,6 +20,10 @@ use super::model::{Model, MotionBound};
 use deformation::Deformation;
 use glam::DVec3;
 
+/// How far a proxy node moves along a way while the facet that was closest to it last is tried first, over the mean edge
+/// (1). Beyond, the one that is near its cube of the lattice is as likely.
+const NEAR: f64 = 0.25;
+
 /// Where a proxy node stands at rest, and what is known of it since.
 #[derive(Clone, Copy, Default)]
 struct RestDistance {
@@ -48,6 +52,8 @@ pub struct Detection {
     nodes: Vec<DVec3>,
     at_rest: Vec<RestDistance>,
     deformation: Deformation,
+    /// Whether one configuration follows another on a way.
+    follows: bool,
 }
 
 impl Detection {
@@ -59,7 +65,15 @@ impl Detection {
             nodes: vec![DVec3::ZERO; count],
             at_rest: vec![RestDistance::default(); count],
             deformation: Deformation::new(model),
+            follows: false,
         }
+    }
+
+    /// The same along a way: searches begin where the last ones ended. What is found is the same but for rounding, where
+    /// two facets are as near.
+    #[must_use]
+    pub fn along_a_way(model: &Model) -> Self {
+        Self { follows: true, ..Self::new(model) }
     }
 
     /// Proxy nodes relative to the model's centre (m).
@@ -110,12 +124,14 @@ impl Detection {
             // Of a node that stands where it stood in the configuration before, as all do that hang on joints which
             // have not moved, all is known.
             if !(known.closest.is_some() && self.nodes[i] == x) {
+                let moved = self.nodes[i].distance(x);
+                let is_near = self.follows && known.closest.is_some() && moved < NEAR * model.surface.mean_edge;
                 self.nodes[i] = x;
                 known.closest = None;
                 known.inside = false;
                 let (bound, near) = model.surface.distance_bound(x);
                 known.distance = bound;
-                known.last = near.unwrap_or(known.last);
+                known.last = near.filter(|_| !is_near).unwrap_or(known.last);
             }
             let clearance = known.signed() - model.chain.nodes[i].radius;
             if clearance < least {

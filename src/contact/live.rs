@@ -2,16 +2,16 @@
 //! rows that pushed before, and without allocating.
 
 use super::detection::Detection;
-use super::equilibrium::rest::{RestLimits, RestProgram, Start};
+use super::equilibrium::rest::{Guess, RestLimits, RestProgram};
 use super::model::Model;
 use super::{NodeForce, Status, reach};
 use crate::JointVector;
 use crate::proxy::Pose;
 
-/// Largest contact that is solved. The scenes that ship have up to 40 rows on 200 nodes. A round with 256 rows takes a
-/// millisecond or two, so that a loop of 1 kHz slows down in so wide a contact, and is not stopped by its watchdog, which
-/// lets ticks take ten. Along a way a program takes one round or two, or as many more as rows come and go at once.
-const LIMITS: RestLimits = RestLimits { rows: 256, nodes: 1024, rounds: 16 };
+/// Largest contact that is solved. The scenes that ship have up to 40 rows on 200 nodes. A round with 512 rows takes some
+/// milliseconds: a loop of 1 kHz slows down in so wide a contact, and is not stopped by its watchdog, which lets ticks
+/// take ten. Along a way a program takes one round or two, or as many more as rows come and go at once.
+const LIMITS: RestLimits = RestLimits { rows: 512, nodes: 1024, rounds: 8 };
 
 /// Solves contact with the surface at rest along a way.
 pub struct LiveSolver<'a> {
@@ -45,7 +45,7 @@ impl<'a> LiveSolver<'a> {
     pub fn new(model: &'a Model<'a>) -> Self {
         let rest = RestProgram::within(model, LIMITS);
         let on_proxy = Vec::with_capacity(LIMITS.rows.min(model.chain.nodes.len()));
-        Self { model, pose: model.chain.new_pose(), detection: Detection::new(model), rest, on_proxy }
+        Self { model, pose: model.chain.new_pose(), detection: Detection::along_a_way(model), rest, on_proxy }
     }
 
     /// Contact at the joint coordinates `q`, one per joint (rad or m); [`Status::Unconverged`] without torque where one
@@ -68,7 +68,7 @@ impl<'a> LiveSolver<'a> {
             found.status = Status::Free;
             return found;
         }
-        let fits = match rest.solve(model, detection, Start::Last) {
+        let fits = match rest.solve(model, detection, Guess::Last) {
             Some(outcome) => outcome.converged,
             None => {
                 found.status = Status::Overflow;

@@ -3,7 +3,7 @@
 use super::detection::Detection;
 use super::equilibrium::energy::{EnergySearch, SolverStats, StoppingCriteria};
 use super::equilibrium::paper::PaperIteration;
-use super::equilibrium::rest::{RestProgram, Start};
+use super::equilibrium::rest::{Guess, RestProgram};
 use super::linear::support::dot;
 use super::model::Model;
 use super::reach;
@@ -241,7 +241,7 @@ impl<'a> Solver<'a> {
     /// rows change along the surface, does not push back on the object.
     fn maximise(&mut self, equilibrium: &mut Equilibrium) -> SolverStats {
         let Self { model, detection, rest, node_forces, marked, touched, .. } = self;
-        let outcome = rest.solve(model, detection, Start::Rest).unwrap_or_default();
+        let outcome = rest.solve(model, detection, Guess::Depths).unwrap_or_default();
         self.held_by = HeldBy::Rest;
         equilibrium.energy = rest.energy;
         for (i, row) in rest.rows.iter().enumerate().filter(|(_, row)| row.multiplier > 0.0) {

@@ -151,17 +151,7 @@ impl Levels for GridRoot {
         1
     }
 
-    fn horizon(&self) -> u64 {
-        0
-    }
-
-    fn gather<const C: usize, const W: usize>(
-        &self,
-        _: u32,
-        low: &Place,
-        _: u64,
-        numbers: &mut [[f64; C]; W],
-    ) -> Gathered {
+    fn gather<const C: usize, const W: usize>(&self, _: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
         for (corner, point) in self.corners::<C>(low).into_iter().enumerate() {
             let record = &self.records[point * W..(point + 1) * W];
             numbers.iter_mut().zip(record).for_each(|(number, entry)| number[corner] = *entry);

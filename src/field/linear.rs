@@ -86,13 +86,13 @@ impl Linear {
 }
 
 impl Interpolant for Linear {
-    fn sample(&self, q: &[f64], _: u64) -> (Sample, u32) {
+    fn sample(&self, q: &[f64]) -> Sample {
         let stencil = self.grid.locate(q);
         let at = with_joints!(self.grid.joints(), D => self.at::<D>(&stencil));
         let mut around = Around::of(&self.points, stencil.fade, stencil.corners());
         around.flags.set(Flags::LAYER, at.held < 1.0);
         around.share = at.held;
-        (around.sample(at.torque, at.energy, at.depth > 0.0), 1)
+        around.sample(at.torque, at.energy, at.depth > 0.0)
     }
 
     /// The greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is

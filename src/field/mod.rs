@@ -2,8 +2,8 @@
 //!
 //! The scene chooses the way ([`Interpolation`]): `linear` (`linear.rs`) interpolates the torque and holds it behind a
 //! boundary layer; `potential` (`potential.rs`) interpolates the energy and takes its gradient, over the points of a
-//! uniform grid (`grid_root.rs`) or the nodes of the store that refines one; `direct`, which solves contact while it is
-//! felt, has `potential` wherever its solution is late. All are continuous and without memory. What they share is in
+//! uniform grid (`grid_root.rs`) or the nodes of the store that refines one; `direct`, of a scene that is meant to be
+//! solved live, is `potential` in a dataset. All are continuous and without memory. What they share is in
 //! `points.rs`: the fade outside the grid, what is said of points that were not computed or did not converge, and the
 //! contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at
 //! free points.
@@ -39,7 +39,6 @@ use crate::{
     contact::Status,
     dataset::{Dataset, Grid},
     scene::Interpolation,
-    store::Store,
 };
 use grid_root::GridRoot;
 use linear::Linear;
@@ -53,13 +52,12 @@ pub struct TorqueField {
     interpolant: Box<dyn Interpolant>,
     has_energy: bool,
     is_potential: bool,
-    store: Option<Arc<Store>>,
 }
 
 /// A way to interpolate.
 trait Interpolant: Send + Sync {
-    /// [`TorqueField::sample_within`]. Never allocates.
-    fn sample(&self, q: &[f64], horizon: u64) -> (Sample, u32);
+    /// [`TorqueField::sample`]. Never allocates.
+    fn sample(&self, q: &[f64]) -> Sample;
 
     /// [`TorqueField::relative_stiffness`].
     fn relative_stiffness(&self, slopes: &JointVector) -> f64;
@@ -136,7 +134,6 @@ impl TorqueField {
             interpolant,
             has_energy: dataset.energy.is_some(),
             is_potential: dataset.refinement.is_some() || interpolation.is_potential(),
-            store: dataset.refinement.clone(),
         })
     }
 
@@ -168,8 +165,7 @@ impl TorqueField {
     /// `slopes`, one per joint (N m/rad): no Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), is
     /// greater. One or less: nowhere steeper than `slopes`. It is the layer's Lipschitz bound L for `slopes` = Ks.
     ///
-    /// A store that grows is bounded as it is when this is called. All cells are searched the first time, and not again
-    /// for the same slopes or multiples of them.
+    /// All cells are searched the first time, and not again for the same slopes or multiples of them.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         self.interpolant.relative_stiffness(slopes)
@@ -178,20 +174,7 @@ impl TorqueField {
     /// The field at `q`, one entry per joint. Never allocates; takes the same time wherever `q` is.
     #[must_use]
     pub fn sample(&self, q: &[f64]) -> Sample {
-        self.sample_within(q, u64::MAX).0
-    }
-
-    /// The field at `q` of the first `horizon` blocks of a refined dataset's store, and the levels, from the base up,
-    /// whose cell around `q` is whole: one of a uniform grid, which has no blocks. Never allocates.
-    #[must_use]
-    pub fn sample_within(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
-        self.interpolant.sample(q, horizon)
-    }
-
-    /// The store of a refined dataset.
-    #[must_use]
-    pub fn store(&self) -> Option<&Store> {
-        self.store.as_deref()
+        self.interpolant.sample(q)
     }
 }
 

@@ -62,15 +62,15 @@ impl<N: RootNodes> Potential<N> {
 }
 
 impl<N: RootNodes> Interpolant for Potential<N> {
-    fn sample(&self, q: &[f64], horizon: u64) -> (Sample, u32) {
+    fn sample(&self, q: &[f64]) -> Sample {
         let cell = Cell::of(self.nodes.base(), q);
-        let root = root(&*self.nodes, cell, horizon);
+        let root = root(&*self.nodes, cell);
         let around = self.nodes.around(q, &cell, &root);
-        (around.sample(root.torque(), self.free_energy + root.energy(), root.value > 0.0), root.whole)
+        around.sample(root.torque(), self.free_energy + root.energy(), root.value > 0.0)
     }
 
     fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
-        self.steepest.norm(slopes, self.nodes.horizon(), || self.steepest(slopes))
+        self.steepest.norm(slopes, || self.steepest(slopes))
     }
 }
 

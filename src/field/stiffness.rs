@@ -42,17 +42,15 @@ pub(super) struct Steepest(Mutex<Option<Found>>);
 struct Found {
     cell: Stiffness,
     slopes: JointVector,
-    /// Blocks of the store, which may grow.
-    blocks: u64,
 }
 
 impl Steepest {
-    /// Returns the norm of the steepest cell of `blocks` blocks relative to `slopes`. `search` returns that cell.
-    pub fn norm(&self, slopes: &JointVector, blocks: u64, search: impl FnOnce() -> Stiffness) -> f64 {
+    /// Returns the norm of the steepest cell relative to `slopes`. `search` returns that cell.
+    pub fn norm(&self, slopes: &JointVector, search: impl FnOnce() -> Stiffness) -> f64 {
         // The cell that is steepest relative to some slopes is it relative to their multiples, too.
-        let is_known = |found: &Found| found.blocks == blocks && is_multiple(slopes, &found.slopes);
+        let is_known = |found: &Found| is_multiple(slopes, &found.slopes);
         let last = self.0.lock().unwrap_or_else(PoisonError::into_inner).filter(is_known);
-        let found = last.unwrap_or_else(|| Found { cell: search(), slopes: *slopes, blocks });
+        let found = last.unwrap_or_else(|| Found { cell: search(), slopes: *slopes });
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(found);
         Stiffness::new(slopes, |a, b| found.cell.entries[a][b]).square.sqrt()
     }
@@ -70,27 +68,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_steepest_cell_is_searched_for_again_where_slopes_or_blocks_are_others() {
+    fn the_steepest_cell_is_searched_for_again_where_slopes_are_others() {
         let steepest = Steepest::default();
         let mut searches = 0;
-        let mut norm = |slopes: [f64; 2], blocks: u64| {
+        let mut norm = |slopes: [f64; 2]| {
             let slopes = JointVector::from_slice(&slopes);
             let search = || {
                 searches += 1;
                 Stiffness::new(&slopes, |a, b| [[3.0, 2.0], [2.0, 1.0]][a][b])
             };
-            (steepest.norm(&slopes, blocks, search), searches)
+            (steepest.norm(&slopes, search), searches)
         };
         // The root of 9 + 4 / 2 + 4 / 2 + 1 / 4.
         let root = 13.25_f64.sqrt();
-        assert_eq!(norm([1.0, 2.0], 0), (root, 1));
-        assert_eq!(norm([1.0, 2.0], 0), (root, 1));
-        assert_eq!(norm([4.0, 8.0], 0), (root / 4.0, 1));
+        assert_eq!(norm([1.0, 2.0]), (root, 1));
+        assert_eq!(norm([1.0, 2.0]), (root, 1));
+        assert_eq!(norm([4.0, 8.0]), (root / 4.0, 1));
         let third = 1.0 / 3.0;
-        assert!((norm([0.1 * third, 0.2 * third], 0).0 * 0.1 * third - root).abs() < 1e-15 * root);
-        assert_eq!(norm([1.0, 2.0], 0).1, 1);
-        assert_eq!(norm([1.0, 2.0 + 1e-12], 0).1, 2);
-        assert_eq!(norm([1.0, 2.0], 0).1, 3);
-        assert_eq!(norm([1.0, 2.0], 7), (root, 4));
+        assert!((norm([0.1 * third, 0.2 * third]).0 * 0.1 * third - root).abs() < 1e-15 * root);
+        assert_eq!(norm([1.0, 2.0]).1, 1);
+        assert_eq!(norm([1.0, 2.0 + 1e-12]).1, 2);
+        assert_eq!(norm([1.0, 2.0]).1, 3);
     }
 }

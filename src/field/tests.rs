@@ -7,7 +7,7 @@ use crate::{
     contact::Status,
     dataset::Provenance,
     joint_matrix::{JointMatrix, add_symmetric},
-    store::{Nodes, Place, Space, root_of},
+    store::{Nodes, Place, Space, Store, root_of},
 };
 use std::collections::BTreeSet;
 
@@ -554,7 +554,7 @@ fn a_store_of_one_level_is_the_grid_of_its_nodes() {
         };
         let tangents: Vec<Vec<f64>> = (0..data.grid.points()).map(tangent).collect();
         let space = Space::new(&data.grid, 1).unwrap();
-        let store = Store::new(space.clone(), data.grid.points());
+        let mut store = Store::new(space.clone());
         let blocks: BTreeSet<Place> = space.base_nodes().map(|node| space.block_of(&node)).collect();
         for block in blocks {
             let mut nodes = Nodes::default();

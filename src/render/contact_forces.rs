@@ -108,7 +108,7 @@ mod tests {
         let scene = Scene::parse(&text, "sphere.toml").unwrap();
         let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
         let (grid, nodes) = (grid_of(&scene), object.rest.len());
-        let store = Arc::new(Store::new(Space::new(&grid, 2).unwrap(), 0));
+        let store = Arc::new(Store::new(Space::new(&grid, 2).unwrap()));
         let provenance = CpuBackend::provenance(&scene);
         let mut dataset = Dataset::refined(store, grid, Some(Surface::of(&object)), text, provenance);
         let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();

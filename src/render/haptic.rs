@@ -20,7 +20,7 @@ use super::{
     effects::{ContactEffects, EffectState, Pending},
     flags::{Fault, Flags},
     npmi::{Motion, Npmi},
-    source::{Contact, TorqueSource},
+    source::{ContactSession, TorqueSource},
     torque_history::TorqueHistory,
     watchdog::{self, GREATEST_POSITION_AGE, TickRate, Watchdog},
 };
@@ -237,7 +237,7 @@ impl Haptics {
     }
 
     /// One tick over `contact`, which the session has of this loop's source.
-    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, contact: &mut Contact<'_>) -> Output {
+    pub fn tick_with(&self, state: &mut State, inputs: &Inputs, contact: &mut ContactSession<'_>) -> Output {
         let checked = self
             .watchdog
             .check(inputs, &state.device)

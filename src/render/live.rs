@@ -50,7 +50,7 @@ impl LiveScene {
         let follows = scene.contact.algorithm != Algorithm::Rest;
         scene.contact.algorithm = Algorithm::Rest;
         let direct = Direct::of(&scene, object)?;
-        let grid = region(&scene);
+        let grid = region(&scene, direct.model().compliance.is_whole());
         let tangents = tangents(direct.model(), &sample(&scene));
         Ok(Self { scene, direct, grid, tangents, follows })
     }
@@ -67,7 +67,8 @@ impl LiveScene {
         &self.direct
     }
 
-    /// The region in which the proxy stays: the scene's grid, or where it has none the joints' limits.
+    /// The region in which the proxy stays: the joints' limits, or where the compliance is known around the scene's grid
+    /// alone, that.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
@@ -108,10 +109,16 @@ impl LiveScene {
     }
 }
 
-/// A grid of few lines over the region of the scene's, or where it has none over the joints' limits.
-fn region(scene: &Scene) -> Grid {
+/// A grid of few lines over the joints' limits where contact `is_known` anywhere or the scene has no grid, else over that
+/// of the scene's.
+fn region(scene: &Scene, is_known: bool) -> Grid {
     let axes = scene.proxy.joints.iter().enumerate().map(|(a, joint)| {
-        let ends = scene.grid.axes.get(a).map(|axis| [axis.start, axis.start + axis.step * (axis.count - 1) as f64]);
+        let ends = scene
+            .grid
+            .axes
+            .get(a)
+            .filter(|_| !is_known)
+            .map(|axis| [axis.start, axis.start + axis.step * (axis.count - 1) as f64]);
         let [start, last] = ends.unwrap_or(joint.limits);
         let step = (last - start) / (LINES - 1) as f64;
         Axis { name: joint.name.clone(), unit: joint.kind.unit().into(), start, step, count: LINES }

@@ -9,7 +9,7 @@ use super::{
     flags::Fault,
     graphics::{Graphics, GraphicsError},
     haptic::{Haptics, Inputs, State},
-    source::Contact,
+    source::ContactSession,
     trace::{Frame, Tick, Trace},
 };
 use crate::{
@@ -73,7 +73,7 @@ pub struct Latest {
 pub struct HapticController<'session> {
     haptics: &'session Haptics,
     state: State,
-    contact: Contact<'session>,
+    contact: ContactSession<'session>,
     start: JointVector,
     /// The tick that is under way, or was the last; none before the first.
     tick: Option<(Tick, Latest)>,

@@ -18,7 +18,7 @@ pub enum TorqueSource {
 }
 
 /// What one session has of it.
-pub enum Contact<'a> {
+pub enum ContactSession<'a> {
     /// See [`TorqueSource::Dataset`].
     Dataset(&'a TorqueField),
     /// See [`TorqueSource::Live`].
@@ -86,15 +86,15 @@ impl TorqueSource {
 
     /// What a session needs of it.
     #[must_use]
-    pub fn begin(&self) -> Contact<'_> {
+    pub fn begin(&self) -> ContactSession<'_> {
         match self {
-            Self::Dataset(field) => Contact::Dataset(field),
-            Self::Live(scene) => Contact::Live(Box::new(LiveSession::new(scene))),
+            Self::Dataset(field) => ContactSession::Dataset(field),
+            Self::Live(scene) => ContactSession::Live(Box::new(LiveSession::new(scene))),
         }
     }
 }
 
-impl Contact<'_> {
+impl ContactSession<'_> {
     /// The contact at `q`, and how many ticks ago it was solved: none where `q` was solved, or looked up. Never
     /// allocates.
     pub(super) fn sample(&mut self, q: &[f64]) -> (Sample, u32) {

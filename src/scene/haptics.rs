@@ -139,8 +139,7 @@ pub enum Interpolation {
     Linear,
     /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop.
     Potential,
-    /// The equilibrium itself, solved beside the loop, and its tangent until the next one; where that is late, and in a
-    /// dataset, `potential`.
+    /// The equilibrium at rest, solved in every tick, of a scene that is felt itself; in a dataset `potential`.
     Direct,
 }
 

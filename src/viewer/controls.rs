@@ -202,7 +202,8 @@ impl Controls {
             Arc::make_mut(scene).contact = contact;
         }
         let differs = loaded.scene.as_ref().is_some_and(|known| known.contact != scene.contact);
-        let text = if differs { RichText::new("Bake again").strong() } else { RichText::new("Bake again") };
+        let text = RichText::new(if loaded.live.is_some() { "Bake" } else { "Bake again" });
+        let text = if differs { text.strong() } else { text };
         let bake = ui.horizontal(|ui| {
             let bake = ui.button(text).on_hover_text("In the background; what is felt now stays until it is done");
             ui.checkbox(&mut self.bake_on_change, "on change").on_hover_text("A change above is baked at once");

@@ -49,7 +49,7 @@ fn texts(loaded: &Loaded) -> [(&'static str, String); 3] {
             (
                 "3  Store",
                 format!(
-                    "Nothing is stored yet. Haptize, on the left, solves the scene by its own law over the joints \
+                    "Nothing is stored yet. Bake, under Haptization, solves the scene by its own law over the joints \
                      {joints}, for a loop that only looks up."
                 ),
             ),

@@ -12,6 +12,9 @@ use haptize::scene::{Algorithm, Scene};
 /// their order is not; in stiff contact rows are good to 1e-16 kc times the object's compliance, 1e-10.
 const ROUNDING: f64 = 1e-9;
 
+/// Rounding of a distance between two points of coordinates below a metre (m).
+const LENGTH_ROUNDING: f64 = 1e-15;
+
 /// The shipped scene of this name with the law at rest, after `edit`.
 fn scene(name: &str, edit: impl Fn(String) -> String) -> Scene {
     let path = format!("{}/datasets/{name}.toml", env!("CARGO_MANIFEST_DIR"));
@@ -51,7 +54,8 @@ fn live_contact_is_that_of_the_solver_wherever_it_comes_from() {
             let (mut touched, mut worst) = (0, 0.0_f64);
             for q in &places {
                 let (found, expected) = (live.solve(q), solver.solve(q));
-                assert_eq!((found.status, found.gap), (expected.status, expected.gap), "{name} {:?}", &q[..]);
+                assert_eq!(found.status, expected.status, "{name} {:?}", &q[..]);
+                assert!((found.gap - expected.gap).abs() <= LENGTH_ROUNDING, "{name} {:?}", &q[..]);
                 let size = expected.torque.iter().fold(0.0_f64, |most, tau| most.max(tau.abs()));
                 let pairs = found.torque.iter().zip(expected.torque.iter());
                 let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -95,7 +99,7 @@ fn what_is_no_configuration_is_not_solved() {
 /// Ten times as many nodes on the arm touch with more than a tick has time for.
 #[test]
 fn contact_of_too_many_nodes_is_not_solved() {
-    let dense = |text: String| text.replace("spacing = 0.0022", "spacing = 0.00022");
+    let dense = |text: String| text.replace("spacing = 0.0022", "spacing = 0.00011");
     let scene = scene("sphere", dense);
     with_model(&scene, |model| {
         let mut live = LiveSolver::new(model);

@@ -19,7 +19,6 @@ const SHARED_NAMES: &[&str] = &[
     "Contact",
     "Contacts",
     "Course",
-    "Explored",
     "Files",
     "Frame",
     "Interpolation",

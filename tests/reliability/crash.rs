@@ -285,7 +285,7 @@ fn work_for_which_there_is_no_memory_is_refused_before_it_begins() {
     // Some kilobytes whose base has eight million points.
     let axis = |name: &str| Axis { name: name.into(), unit: "rad".into(), start: 0.0, step: 0.01, count: 200 };
     let grid = Grid { axes: ["a", "b", "c"].map(axis).to_vec() };
-    let store = Store::new(Space::new(&grid, 2).unwrap(), 0);
+    let store = Store::new(Space::new(&grid, 2).unwrap());
     store.save(&grid, None, "", &Provenance::default(), &folder.join("sparse.haptize")).unwrap();
     assert!(std::fs::metadata(folder.join("sparse.haptize")).unwrap().len() < 20_000);
     let sphere = |edge: &str, springs: &str| {

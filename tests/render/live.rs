@@ -42,7 +42,7 @@ fn a_live_session_makes_no_energy_and_is_repeated_and_replayed_to_the_last_bit()
 
 #[test]
 fn contact_that_is_not_solved_is_felt_on_for_as_long_as_a_position_may_be_old() {
-    let (_, setup) = live("sphere", |text| text.replace("spacing = 0.0022", "spacing = 0.0002"));
+    let (_, setup) = live("sphere", |text| text.replace("spacing = 0.0022", "spacing = 0.0001"));
     let haptics = &setup.haptics;
     let press = Motion::through(&setup.scene.motion.press, 3).unwrap();
     let mut state = haptics.start(&press.at(0.0).0).unwrap();

@@ -77,8 +77,7 @@ pub fn nodes(
 pub fn store(joints: usize, levels: u32, share: f64, seed: u64, mut record: impl FnMut(&[f64]) -> Vec<f64>) -> Store {
     let mut random = Random(seed);
     let space = space(joints, levels);
-    let most = (0..levels).map(|level| blocks(&space, level).len()).sum();
-    let store = Store::new(space.clone(), most);
+    let mut store = Store::new(space.clone());
     for level in 0..levels {
         for block in blocks(&space, level) {
             let rests = store.foundation(level, &block).all(|(below, place)| store.get(below, &place).is_some());

@@ -7,7 +7,7 @@ use haptize::{
     field::TorqueField,
     scene::Interpolation,
     store::{
-        Place, Root, Space, Store,
+        Root, Space, Store,
         record::{mixed, slope, width},
     },
 };
@@ -202,7 +202,7 @@ fn beyond_the_grid_and_what_is_no_number_is_answered_at_the_border() {
     assert_eq!(store.sample(&[9.0, 1e300, f64::INFINITY]), corner);
     let first = store.sample(&store.space().configuration(0, &[0; MAX_JOINTS]));
     assert_eq!(store.sample(&[f64::NAN, -9.0, f64::NEG_INFINITY]), first);
-    let empty = Store::new(space(3, 2), 8);
+    let empty = Store::new(space(3, 2));
     let root = empty.sample(&[0.0; 3]);
     assert_eq!((root.value, root.levels), (0.0, 0));
     assert_eq!(blocks(&space(3, 2), 0).len(), 8);
@@ -257,7 +257,7 @@ fn whole(joints: usize, count: usize, mut record: impl FnMut(&[f64]) -> Vec<f64>
     let grid = Grid { axes: (0..joints).map(axis).collect() };
     let space = Space::new(&grid, 1).unwrap();
     let places = blocks(&space, 0);
-    let store = Store::new(space, places.len());
+    let mut store = Store::new(space);
     for place in places {
         store.publish(0, &place, nodes(store.space(), 0, &place, |_| true, &mut record)).unwrap();
     }
@@ -308,33 +308,4 @@ fn where_nothing_bends_the_bound_is_below_what_a_bend_has() {
         let field = TorqueField::interpolated(&data, Interpolation::Potential, 0.5, &ones).unwrap();
         assert!(field.relative_stiffness(&ones) < 100.0);
     }
-}
-
-#[test]
-fn the_bound_of_a_store_that_grows_is_that_of_what_there_is() {
-    let joints = 2;
-    let mut one = |_: &[f64]| {
-        let mut record = vec![0.0; width(joints)];
-        record[0] = 1.0;
-        record
-    };
-    let axis = |a: usize| Axis { name: format!("joint {a}"), unit: "rad".into(), start: -0.2, step: step(a), count: 4 };
-    let grid = Grid { axes: (0..joints).map(axis).collect() };
-    let space = Space::new(&grid, 2).unwrap();
-    let store = Arc::new(Store::new(space.clone(), 64));
-    let publish = |level: u32, place: &Place, record: &mut dyn FnMut(&[f64]) -> Vec<f64>| {
-        store.publish(level, place, nodes(&space, level, place, |_| true, record)).unwrap();
-    };
-    for place in blocks(&space, 0) {
-        publish(0, &place, &mut one);
-    }
-    let data = Dataset::refined(Arc::clone(&store), grid, None, "name = \"grows\"".into(), Provenance::default());
-    let ones = JointVector::from_slice(&vec![1.0; joints]);
-    let field = || TorqueField::interpolated(&data, Interpolation::Potential, 0.5, &ones).unwrap();
-    let felt = field();
-    let before = felt.relative_stiffness(&ones);
-    publish(1, &blocks(&space, 1)[0], &mut noise(joints, 3));
-    let after = felt.relative_stiffness(&ones);
-    assert!(after > 10.0 * before + 1.0, "{before}, {after}");
-    assert_eq!(after, field().relative_stiffness(&ones));
 }

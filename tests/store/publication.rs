@@ -1,12 +1,30 @@
 //! What may be published, in what order, and that order does not matter.
 
 use crate::fixture::{blocks, nodes, noise, space, store};
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use haptize::{
     MAX_JOINTS,
     contact::Status,
     dataset::{Axis, Grid},
     store::{Nodes, Place, PublishError, Space, SpaceError, Store, record::width},
 };
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+#[test]
+fn a_look_up_allocates_nothing() {
+    for joints in [2, 3, 5] {
+        let store = store(joints, 3, 0.6, 1, noise(joints, 1));
+        let mut finest = 0;
+        for k in 0..1000 {
+            let mut q = [0.0; 5];
+            q.iter_mut().enumerate().for_each(|(a, q)| *q = 0.25 * (0.3 * f64::from(k) + a as f64).sin());
+            finest = finest.max(assert_no_alloc(|| store.sample(&q[..joints])).levels);
+        }
+        assert!(finest > 1, "{finest}");
+    }
+}
 
 #[test]
 fn the_same_blocks_in_another_order_make_the_same_store_to_the_bit() {
@@ -16,7 +34,7 @@ fn the_same_blocks_in_another_order_make_the_same_store_to_the_bit() {
         // Level by level, backwards.
         all.reverse();
         all.sort_by_key(|(key, _)| one.space().block(*key).unwrap().0);
-        let other = Store::new(one.space().clone(), all.len());
+        let mut other = Store::new(one.space().clone());
         for (key, block) in all {
             let (level, place) = one.space().block(key).unwrap();
             other.publish(level, &place, block.nodes().clone()).unwrap();
@@ -32,7 +50,7 @@ fn the_same_blocks_in_another_order_make_the_same_store_to_the_bit() {
 #[test]
 fn a_block_without_its_foundation_or_twice_is_refused() {
     let space = space(2, 3);
-    let store = Store::new(space.clone(), 64);
+    let mut store = Store::new(space.clone());
     let make = |level, block: &Place| nodes(&space, level, block, |_| true, noise(2, 1));
     let place = [1, 1, 0, 0, 0, 0];
     assert!(matches!(store.publish(1, &place, make(1, &place)), Err(PublishError::Order { .. })));
@@ -47,7 +65,7 @@ fn a_block_without_its_foundation_or_twice_is_refused() {
 #[test]
 fn what_is_not_sound_is_refused() {
     let space = space(2, 2);
-    let store = Store::new(space.clone(), 64);
+    let mut store = Store::new(space.clone());
     let block = [0; MAX_JOINTS];
     let sound = nodes(&space, 0, &block, |_| true, noise(2, 1));
     let mut bad = vec![sound.clone(), sound.clone(), sound.clone(), sound.clone(), sound.clone()];
@@ -67,24 +85,6 @@ fn what_is_not_sound_is_refused() {
     let mut even = Nodes::default();
     even.push(0, &vec![0.0; width(2)], 0.0, Status::Free);
     assert!(matches!(store.publish(1, &block, even), Err(PublishError::Unsound { .. })));
-}
-
-#[test]
-fn a_full_store_says_so_and_room_can_be_made() {
-    let space = space(1, 4);
-    let mut store = Store::new(space.clone(), 1);
-    let all: Vec<_> = (0..4).flat_map(|level| blocks(&space, level).into_iter().map(move |b| (level, b))).collect();
-    let mut refused = 0;
-    for (level, block) in &all {
-        let nodes = || nodes(&space, *level, block, |_| true, noise(1, 1));
-        if let Err(error) = store.publish(*level, block, nodes()) {
-            assert!(matches!(error, PublishError::Full(_)), "{error}");
-            refused += 1;
-            store.reserve(all.len());
-            store.publish(*level, block, nodes()).unwrap();
-        }
-    }
-    assert_eq!((refused, store.blocks().len()), (1, all.len()));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::window::{SPHERE, Window, scanned, small_scene};
 use eframe::egui::{Theme, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
-use haptize::viewer::Start;
+use haptize::{scene::Scene, sweep::baked, viewer::Start};
 
 #[test]
 fn a_motion_plays_pauses_and_is_scrubbed() {
@@ -63,8 +63,8 @@ fn a_drag_ends_in_contact_and_shows_torque() {
 #[test]
 fn the_window_tells_the_border_of_the_haptized_range_from_free_space_beyond_it() {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("narrow.toml");
-    std::fs::write(&file, small_scene()).unwrap();
+    let file = folder.path().join("narrow.haptize");
+    baked(&Scene::parse(&small_scene(), "narrow.toml").unwrap()).unwrap().0.save(&file).unwrap();
     let mut window = Window::open(&Start::File(file), [1200.0, 800.0], Theme::Light);
     assert_eq!(window.harness.state().error(), None);
     assert!(!window.shows("outside the haptized range"));

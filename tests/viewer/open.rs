@@ -170,7 +170,7 @@ fn a_scene_is_baked_on_the_adapter_that_is_chosen() {
     let adapter = DEVICE_NAME.get().unwrap();
     assert!(!window.shows(&format!("on {adapter}")), "baked on {adapter} before it was chosen");
     window.choose("on", &format!("{}, Vulkan", adapter.split(" (").next().unwrap()));
-    window.reach("Bake again");
+    window.reach("Bake");
     window.wait();
     assert_eq!(window.harness.state().error(), None);
     assert!(window.shows(&format!("on {adapter}")), "not baked on {adapter}");

@@ -62,6 +62,8 @@ fn nothing_overlaps_in_the_least_window_however_long_the_name_and_however_many_t
     let text = text.replacen("axes = [\n", &format!("axes = [\n{lines}"), 1).replace("q = [", "q = [0.0, 0.0, 0.0, ");
     std::fs::write(&file, text).unwrap();
     let mut window = Window::open(&Start::File(file), LEAST_WINDOW, Theme::Light);
+    window.reach("Bake");
+    window.wait();
     assert_eq!(window.harness.state().error(), None);
     window.click("Press");
     window.pass(1.0);

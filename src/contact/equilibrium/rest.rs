@@ -15,7 +15,7 @@
 //!
 //! Only nodes that touch somewhere have a row: first those below the surface at rest, and, after the program is solved,
 //! those that the surface has bulged up to, until there are no more. Along a way the rows that pushed last are there
-//! from the beginning ([`Start::Last`]): the solution is the same, and is found sooner.
+//! from the beginning ([`Guess::Last`]): the solution is the same, and is found sooner.
 
 mod tangent;
 
@@ -29,12 +29,12 @@ use crate::contact::linear::support::{Support, dot};
 use crate::contact::model::Model;
 use glam::DVec3;
 
-/// What a solution is sought from. It is the same but for rounding.
+/// Which rows push, before it is known. The solution is the same but for rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Start {
-    /// The configuration alone: results do not depend on what was solved before, to the last bit.
-    Rest,
-    /// The rows that pushed at the configuration that was solved last.
+pub enum Guess {
+    /// Those below the surface at rest: results do not depend on what was solved before, to the last bit.
+    Depths,
+    /// Those that pushed at the configuration that was solved last.
     Last,
 }
 
@@ -117,14 +117,14 @@ impl RestProgram {
     }
 
     /// Solves the configuration that `detection` has taken up; `None` where it is beyond the limits in size.
-    pub fn solve(&mut self, model: &Model, detection: &mut Detection, start: Start) -> Option<SolverStats> {
+    pub fn solve(&mut self, model: &Model, detection: &mut Detection, guess: Guess) -> Option<SolverStats> {
         self.support.clear();
         self.rows.clear();
         self.slots.clear();
         self.depths.clear();
         let mut fits = true;
         for i in 0..model.chain.nodes.len() {
-            let pushed = self.pushes[i].take().filter(|_| start == Start::Last);
+            let pushed = self.pushes[i].take().filter(|_| guess == Guess::Last);
             let reach = if pushed == Some(true) { f64::INFINITY } else { 0.0 };
             if fits && let Some(row) = detection.at_rest(model, i, reach) {
                 let pushes = pushed.unwrap_or(row.depth > 0.0);
@@ -135,9 +135,9 @@ impl RestProgram {
         while fits {
             self.assemble(model, known);
             let Self { program, compliance, depths, rows, pushes, .. } = self;
-            let guess = rows.iter().map(|row| pushes[row.proxy_node as usize] == Some(true));
+            let are_free = rows.iter().map(|row| pushes[row.proxy_node as usize] == Some(true));
             let left = self.limits.rounds.saturating_sub(iterations);
-            let (ended, rounds) = program.solve(compliance, depths, guess, left);
+            let (ended, rounds) = program.solve(compliance, depths, are_free, left);
             iterations += rounds;
             self.take_solution(model);
             known = self.rows.len();

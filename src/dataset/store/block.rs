@@ -56,8 +56,6 @@ pub struct Block {
     /// Numbers of the interpolation at each node less those that the levels below give there, lengths in steps of the
     /// level.
     pub(super) surplus: Box<[f32]>,
-    /// How many blocks were published before it.
-    pub(super) number: u64,
 }
 
 impl Block {
@@ -67,10 +65,10 @@ impl Block {
         &self.nodes
     }
 
-    pub(super) fn new(nodes: Nodes, surplus: Box<[f32]>, number: u64) -> Self {
+    pub(super) fn new(nodes: Nodes, surplus: Box<[f32]>) -> Self {
         let is_failed = |number: &u8| Status::from_number(*number).is_some_and(Status::is_failed);
         let failed = nodes.places().zip(&nodes.status).filter(|(_, status)| is_failed(status));
-        Self { failed: failed.map(|(place, _)| 1 << place).sum(), nodes, surplus, number }
+        Self { failed: failed.map(|(place, _)| 1 << place).sum(), nodes, surplus }
     }
 
     /// The surplus of the node at `place`, `kinds` numbers; `None` if it was not solved.

@@ -58,7 +58,7 @@ const ORDER: &str = "potential";
 ///
 /// # Errors
 /// [`Shortage`].
-pub fn check_memory(grid: &Grid) -> Result<(), Shortage> {
+fn check_memory(grid: &Grid) -> Result<(), Shortage> {
     let row = grid.joints() * size_of::<f64>() + size_of::<f64>() + size_of::<f32>() + size_of::<u8>();
     let needed = grid.points().saturating_mul(row);
     if needed > memory::SMALL { memory::check(needed) } else { Ok(()) }
@@ -197,7 +197,7 @@ fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Datas
     if let Some(k) = keys.windows(2).position(|pair| pair[0] >= pair[1]) {
         return Err(format!("block {} is out of order", k + 1));
     }
-    let store = Store::new(space, keys.len());
+    let mut store = Store::new(space);
     let mut first = 0;
     for (&key, &present) in keys.iter().zip(present.iter()) {
         let Some((level, block)) = store.space.block(key) else {

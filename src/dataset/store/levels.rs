@@ -18,19 +18,10 @@ pub(crate) trait Levels: Send + Sync {
     /// Number of levels, the base included.
     fn count(&self) -> u32;
 
-    /// Number of blocks that are published; 0 where nodes do not change.
-    fn horizon(&self) -> u64;
-
-    /// Copies the numbers ([`super::record`]) that the first `horizon` blocks of `level` add at the corners of its cell
+    /// Copies the numbers ([`super::record`]) that the blocks of `level` add at the corners of its cell
     /// with first corner `low`: kind by kind, lengths in steps of the level, zeros where there is no node; nothing where
     /// there is no block. `C = 2^d`, `W = width(d)`.
-    fn gather<const C: usize, const W: usize>(
-        &self,
-        level: u32,
-        low: &Place,
-        horizon: u64,
-        numbers: &mut [[f64; C]; W],
-    ) -> Gathered;
+    fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered;
 }
 
 /// What there is at the corners of a cell.
@@ -96,26 +87,22 @@ macro_rules! with_joints {
 }
 pub(crate) use with_joints;
 
-/// The function in a `cell` of the base, of the first `horizon` blocks of `nodes`. Never allocates, locks or waits.
-pub(crate) fn root<N: Levels>(nodes: &N, cell: Cell, horizon: u64) -> Root {
+/// The function of `nodes` in a `cell` of the base. Never allocates.
+pub(crate) fn root<N: Levels>(nodes: &N, cell: Cell) -> Root {
     use kernel::rates;
-    with_joints!(nodes.base().joints(), D => sum::<N, D, { 1 << D }, { width(D) }, { rates(D) }>(nodes, cell, horizon))
+    with_joints!(nodes.base().joints(), D => sum::<N, D, { 1 << D }, { width(D) }, { rates(D) }>(nodes, cell))
 }
 
 /// Adds up the levels, each from the `W` numbers at the `C` corners of its cell. `C = 2^D`, `W = width(D)`,
 /// `R = rates(D)`.
-fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize>(
-    nodes: &N,
-    mut cell: Cell,
-    horizon: u64,
-) -> Root {
+fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize>(nodes: &N, mut cell: Cell) -> Root {
     let mut root = Root { value: 0.0, slopes: JointVector::zeros(D), levels: 0, whole: 0, failed: false };
     let mut numbers = [[0.0; C]; W];
     for level in 0..nodes.count() {
         if level > 0 {
             cell.halve();
         }
-        let gathered = nodes.gather(level, &cell.low, horizon, &mut numbers);
+        let gathered = nodes.gather(level, &cell.low, &mut numbers);
         if !gathered.found {
             break;
         }
@@ -138,7 +125,7 @@ fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize
 pub(crate) fn added<N: Levels>(nodes: &N, level: u32, low: &Place) -> Option<Vec<f64>> {
     with_joints!(nodes.base().joints(), D => {
         let mut numbers = [[0.0; 1 << D]; width(D)];
-        let gathered = nodes.gather(level, low, u64::MAX, &mut numbers);
+        let gathered = nodes.gather(level, low, &mut numbers);
         gathered.found.then(|| numbers.as_flattened().to_vec())
     })
 }

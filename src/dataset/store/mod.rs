@@ -3,7 +3,6 @@
 //! | file | subject |
 //! |---|---|
 //! | `space` | where nodes and blocks of each level lie, and their keys |
-//! | `directory` | from keys to blocks, for readers that never wait |
 //! | `block` | what a block holds |
 //! | `record` | the numbers of a node |
 //! | `kernel` | the interpolant of one cell |
@@ -25,43 +24,51 @@
 //! Design, bounds and figures: docs/store.md.
 
 mod block;
-mod directory;
 pub(super) mod file;
 mod kernel;
 mod levels;
 pub mod record;
 pub mod space;
-mod sync;
 
 pub use block::{Block, Nodes};
-pub use file::check_memory;
 pub(crate) use space::Cell;
 pub use space::{Place, Space, SpaceError};
 
 use crate::{MAX_JOINTS, dataset::Grid};
 pub(crate) use block::beyond;
-use directory::{Directory, Refusal};
 pub use levels::Root;
 pub(crate) use levels::{Gathered, Levels, added, root, with_joints};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
 use space::MOST_BLOCK_JOINTS;
-use std::sync::{
-    Mutex, PoisonError,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    collections::HashMap,
+    hash::{BuildHasherDefault, Hasher},
 };
 
-/// Blocks of C-space at several levels. Any number of threads may read and publish at once.
-///
-/// Blocks are numbered in the order in which they are published. A reader that needs the same function twice, between
-/// which others publish, names a [horizon](Store::horizon): the number of blocks that count.
+/// Blocks of C-space at several levels.
 pub struct Store {
     space: Space,
-    blocks: Directory<Block>,
-    /// Number of the next block. Held by writers while a block gets its number and is published, so that all before it
-    /// are there.
-    numbers: Mutex<u64>,
-    /// Number of blocks that are published, without gaps.
-    published: AtomicU64,
+    blocks: HashMap<u64, Block, BuildHasherDefault<KeyHasher>>,
+}
+
+/// Scatters keys, which are neither many to one nor chosen by anybody: Fibonacci hashing, 2^64 over the golden ratio
+/// (Knuth, The Art of Computer Programming 3, section 6.4).
+#[derive(Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u64(self.0 ^ u64::from(byte)));
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        // Tables take the low bits, and the highest.
+        self.0 = key.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(u64::BITS / 2);
+    }
 }
 
 /// A block was not published; the store is as before.
@@ -87,28 +94,13 @@ pub enum PublishError {
         /// Its key.
         key: u64,
     },
-    /// There is no room.
-    #[error("the store is full with {0} blocks")]
-    Full(usize),
 }
 
 impl Store {
-    /// An empty store over `space` with room for `most` blocks.
+    /// An empty store over `space`.
     #[must_use]
-    pub fn new(space: Space, most: usize) -> Self {
-        Self { space, blocks: Directory::new(most), numbers: Mutex::new(0), published: AtomicU64::new(0) }
-    }
-
-    /// Number of blocks published so far: what [`Store::sample_within`] needs to see the same function again.
-    #[must_use]
-    pub fn horizon(&self) -> u64 {
-        Levels::horizon(self)
-    }
-
-    /// Most blocks for which there is room.
-    #[must_use]
-    pub fn capacity(&self) -> usize {
-        self.blocks.capacity()
+    pub fn new(space: Space) -> Self {
+        Self { space, blocks: HashMap::default() }
     }
 
     /// Returns where its nodes lie.
@@ -117,25 +109,16 @@ impl Store {
         &self.space
     }
 
-    /// Makes room for `most` blocks.
-    pub fn reserve(&mut self, most: usize) {
-        if most > self.blocks.capacity() {
-            self.blocks.resize(most);
-        }
-    }
-
     /// A published block.
     #[must_use]
     pub fn get(&self, level: u32, block: &Place) -> Option<&Block> {
-        self.blocks.get(self.space.key(level, block))
+        self.blocks.get(&self.space.key(level, block))
     }
 
-    /// All blocks that are there now, each with those on which it rests, whatever others publish meanwhile. Ascending
-    /// by key: those of the base first.
+    /// All blocks, ascending by key: those of the base first.
     #[must_use]
     pub fn blocks(&self) -> Vec<(u64, &Block)> {
-        let horizon = self.horizon();
-        let mut blocks: Vec<_> = self.blocks.iter().filter(|(_, block)| block.number < horizon).collect();
+        let mut blocks: Vec<_> = self.blocks.iter().map(|(key, block)| (*key, block)).collect();
         blocks.sort_unstable_by_key(|(key, _)| *key);
         blocks
     }
@@ -162,22 +145,11 @@ impl Store {
         })
     }
 
-    /// The blocks that hold the corners of the cell of `level` whose first corner is `low`, by level and place, without
-    /// those of levels below; with blocks of 2^d nodes some twice.
-    pub fn corners(&self, level: u32, low: &Place) -> impl Iterator<Item = Place> + use<> {
-        let (space, low) = (self.space.clone(), *low);
-        let nodes = (0..1_usize << space.joints()).map(move |set| beyond(&low, set));
-        let is_one = space.block_nodes() == 1;
-        nodes
-            .filter(move |node| !is_one || level == 0 || node.iter().any(|i| i & 1 == 1))
-            .map(move |node| space.block_of(&node))
-    }
-
     /// Publishes a block: its nodes, of those that [`Space::nodes`] names.
     ///
     /// # Errors
     /// [`PublishError`].
-    pub fn publish(&self, level: u32, place: &Place, nodes: Nodes) -> Result<(), PublishError> {
+    pub fn publish(&mut self, level: u32, place: &Place, nodes: Nodes) -> Result<(), PublishError> {
         let key = self.space.key(level, place);
         if self.space.block(key) != Some((level, *place)) {
             return Err(PublishError::Unsound { key });
@@ -192,17 +164,12 @@ impl Store {
                 return Err(PublishError::Order { key, missing: self.space.key(at, &below) });
             }
         }
-        let surplus = self.surplus(level, &all, &nodes);
-        let mut next = self.numbers.lock().unwrap_or_else(PoisonError::into_inner);
-        match self.blocks.publish(key, Block::new(nodes, surplus, *next)) {
-            Ok(_) => {
-                *next += 1;
-                self.published.store(*next, Ordering::Release);
-                Ok(())
-            }
-            Err(Refusal::Taken) => Err(PublishError::Taken { key }),
-            Err(Refusal::Full) => Err(PublishError::Full(self.blocks.capacity())),
+        if self.blocks.contains_key(&key) {
+            return Err(PublishError::Taken { key });
         }
+        let surplus = self.surplus(level, &all, &nodes);
+        self.blocks.insert(key, Block::new(nodes, surplus));
+        Ok(())
     }
 
     /// Surplus of the `nodes` of a block of `level`, all of whose nodes are `all`.
@@ -248,17 +215,10 @@ impl Store {
         sum
     }
 
-    /// The function at `q`, one entry per joint; beyond the grid that at its border. Never allocates, locks or waits.
+    /// The function at `q`, one entry per joint; beyond the grid that at its border. Never allocates.
     #[must_use]
     pub fn sample(&self, q: &[f64]) -> Root {
-        self.sample_within(q, u64::MAX)
-    }
-
-    /// The same with the first `horizon` blocks alone: whatever others publish, it does not change. A block counts with
-    /// those on which it rests, which were published before it.
-    #[must_use]
-    pub fn sample_within(&self, q: &[f64], horizon: u64) -> Root {
-        levels::root(self, Cell::of(self.base(), q), horizon)
+        levels::root(self, Cell::of(self.base(), q))
     }
 
     /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).
@@ -274,7 +234,7 @@ impl Store {
     /// Memory of all blocks (bytes).
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.blocks.iter().map(|(_, block)| block.bytes() + 2 * size_of::<usize>()).sum()
+        self.blocks.values().map(|block| block.bytes() + 2 * size_of::<usize>()).sum()
     }
 }
 
@@ -287,17 +247,7 @@ impl Levels for Store {
         self.space.levels()
     }
 
-    fn horizon(&self) -> u64 {
-        self.published.load(Ordering::Acquire)
-    }
-
-    fn gather<const C: usize, const W: usize>(
-        &self,
-        level: u32,
-        low: &Place,
-        horizon: u64,
-        numbers: &mut [[f64; C]; W],
-    ) -> Gathered {
+    fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
         let joints = const { C.ilog2() as usize };
         // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
         // the other. With blocks of one node they do so along all axes.
@@ -316,8 +266,7 @@ impl Levels for Store {
         for beside in (0..C).filter(|side| side & even == 0) {
             // The corner whose coordinates are all even belongs to a level below: a block of it alone does not exist.
             let is_below = is_one && level > 0 && beside == parity;
-            let block = if is_below { None } else { self.blocks.get(keys[beside]) };
-            blocks[beside] = block.filter(|block| block.number < horizon);
+            blocks[beside] = if is_below { None } else { self.blocks.get(&keys[beside]) };
             gathered.found |= blocks[beside].is_some();
             gathered.whole &= is_below || blocks[beside].is_some();
         }

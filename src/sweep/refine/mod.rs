@@ -188,7 +188,7 @@ struct Filling<'a, B> {
 impl<B: Backend> Filling<'_, B> {
     /// The store of what is there.
     fn store(&self) -> Result<Store, PublishError> {
-        let mut store = Store::new(self.book.nodes.space.clone(), 0);
+        let mut store = Store::new(self.book.nodes.space.clone());
         for (level, nodes) in (0..).zip(&self.nodes) {
             publish(&mut store, &self.book.nodes, level, nodes)?;
         }
@@ -358,6 +358,5 @@ fn publish(store: &mut Store, held: &HeldNodes, level: u32, nodes: &BTreeSet<Pla
             }
         }
     }
-    store.reserve(store.blocks().len() + blocks.len());
     blocks.into_iter().try_for_each(|((level, block), nodes)| store.publish(level, &block, nodes))
 }

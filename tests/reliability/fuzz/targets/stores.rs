@@ -41,7 +41,7 @@ pub const STORES: Target = Target {
 fn made(joints: usize) -> Vec<u8> {
     let axis = |a| Axis { name: format!("joint {a}"), unit: "rad".into(), start: -0.2, step: 0.1, count: 3 };
     let grid = Grid { axes: (0..joints).map(axis).collect() };
-    let store = Store::new(Space::new(&grid, 2).unwrap(), 1 << 10);
+    let mut store = Store::new(Space::new(&grid, 2).unwrap());
     let mut serial = 0;
     for level in 0..2 {
         let last = store.space().last(level);
