@@ -4,7 +4,7 @@ use crate::fixture::{context, load, load_of, on_grid};
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, Proximity, Solver, Status},
+    contact::{Equilibrium, Model, Solver, Status},
     gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver},
     joint_matrix::lower,
     object::{Compliance, Object},
@@ -104,8 +104,8 @@ fn difference(cpu: &[Equilibrium], gpu: &[Equilibrium], nodes: usize) -> Option<
 }
 
 /// Solves `configurations` on both sides; asserts agreement, and that at most one in `share` of those in contact is left
-/// to the CPU. Returns the CPU's results.
-fn check(what: &str, model: &Model, configurations: &[JointVector], share: usize) -> Vec<Equilibrium> {
+/// to the CPU.
+fn check(what: &str, model: &Model, configurations: &[JointVector], share: usize) {
     let mut cpu = Solver::new(model);
     let reference: Vec<Equilibrium> = configurations.iter().map(|q| cpu.solve(q)).collect();
     let mut gpu = GpuSolver::new(context(), model).unwrap();
@@ -117,14 +117,11 @@ fn check(what: &str, model: &Model, configurations: &[JointVector], share: usize
     assert!(touching >= 15, "{what}: only {touching} configurations in contact");
     assert_eq!(difference(&reference, &results, model.object.rest.len()), None, "{what}");
     assert!(gpu.left_to_cpu() * share <= touching, "{what}: {} left to the CPU", gpu.left_to_cpu());
-    reference
 }
 
-/// Flat and bent facets, points and balls, springs and a solid, with tangents and without; and nodes that the bulged
-/// surface reaches.
+/// Flat and bent facets, points and balls, springs and a solid, with tangents and without.
 #[test]
 fn all_scenes_have_the_same_equilibria_on_gpu_and_cpu() {
-    let mut reached = 0;
     for (name, material, surface, stride) in [
         ("sphere.toml", None, ContactSurface::Facets, 131),
         ("sphere.toml", None, ContactSurface::Smooth, 131),
@@ -142,15 +139,8 @@ fn all_scenes_have_the_same_equilibria_on_gpu_and_cpu() {
             q.iter_mut().zip(&scene.grid.axes).for_each(|(x, axis)| *x += 0.37 * axis.step);
         }
         let what = format!("{name}, {surface:?}, {} a node", model.compliance.rows_per_node);
-        let reference = check(&what, &model, &configurations, 20);
-        let mut proximity = Proximity::new(&model);
-        for (q, result) in configurations.iter().zip(&reference) {
-            proximity.gap(q);
-            let clearances: Vec<f64> = proximity.clearances().collect();
-            reached += result.touches.iter().filter(|touch| clearances[touch.proxy_node as usize] > 0.0).count();
-        }
+        check(&what, &model, &configurations, 20);
     }
-    assert!(reached > 20, "only {reached} nodes are reached by the bulged surface");
 }
 
 /// In stiff contact the matrix of the program is nearly singular where nodes are closer than the body resolves.
