@@ -179,7 +179,7 @@ fn sweep(context: &Arc<Context>, name: &str, adapter: Adapter) -> Result<(), Box
 /// Operations (1) and bytes of the compliance (B) that the contacts take: for each pair of a row's nodes with another
 /// row's one entry of S, then the displacement by all forces and by the load of each joint; and factors of S.
 fn work(model: &Model<'_>, equilibria: &[Equilibrium]) -> [f64; 2] {
-    let numbers = if model.compliance.rows_per_node == 1 { 1.0 } else { 9.0 };
+    let numbers: f64 = if model.compliance.rows_per_node == 1 { 1.0 } else { 9.0 };
     let mut sums = [0.0; 2];
     for equilibrium in equilibria {
         let rows = equilibrium.touches.len() as f64;

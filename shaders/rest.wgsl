@@ -4,68 +4,13 @@
 // Widens the distance that the surface moves at most, for the rounding of what bounds it.
 const MOTION_SLACK: f32 = 1.0001;
 
-// Where a search for the rows of a configuration stands.
-struct Detected {
-    gap: f32,
-    count: u32,
-}
-
-// Makes the own row of proxy node `node` at x; false where no facet is near.
-fn find_row(node: u32, x: vec3<f32>, near: u32) -> bool {
-    let found = closest_facet(x, near);
-    if found.facet == ABSENT {
-        return false;
-    }
-    let outward = pseudonormal(found.facet, found.point, x);
-    make_row(x, radius_of(node), found.facet, found.point, outward);
-    return true;
-}
-
-// The smallest gap of a configuration, and a row for each proxy node that touches at rest, ascending.
-fn detect(configuration: u32, local: u32) -> Detected {
+// Upper bound of the smallest gap; zero where it is below.
+fn bound_of_gap(configuration: u32, local: u32) -> f32 {
     var upper = FAR_AWAY;
     for (var node = local; node < parameters.proxy_nodes; node += WORKGROUP) {
         upper = min(upper, bounds_at(node_at(configuration, node)).upper - radius_of(node));
     }
-    let known = max(least_of(upper, local), 0.0);
-    var gap = FAR_AWAY;
-    for (var first = 0u; first < parameters.proxy_nodes; first += WORKGROUP) {
-        let node = first + local;
-        var is_touching = false;
-        if node < parameters.proxy_nodes {
-            let x = node_at(configuration, node);
-            let bounds = bounds_at(x);
-            if bounds.lower - radius_of(node) <= known && find_row(node, x, bounds.near) {
-                gap = min(gap, -own.depth);
-                is_touching = own.depth >= 0.0;
-            }
-        }
-        add_row(node, is_touching, local);
-    }
-    return Detected(least_of(gap, local), listed);
-}
-
-// Adds the own row, if it `is_wanted`, behind those of the invocations before. For all together.
-fn add_row(node: u32, is_wanted: bool, local: u32) {
-    let place = place_in_list(is_wanted, local);
-    if is_wanted && place < ROOM {
-        store_row(place, node);
-    }
-}
-
-// Sets the entries of S for the rows from `first` on, of `count` in all.
-fn couple(first: u32, count: u32, local: u32) {
-    workgroupBarrier();
-    for (var place = entry(first, 0u) + local; place < entry(count, 0u); place += WORKGROUP) {
-        var i = u32((sqrt(8.0 * f32(place) + 1.0) - 1.0) * 0.5);
-        i = select(i, i + 1u, entry(i + 1u, 0u) <= place);
-        i = select(i, i - 1u, entry(i, 0u) > place);
-        let j = place - entry(i, 0u);
-        take_row(i);
-        take_places();
-        matrix[place] = coupling(j) + select(0.0, parameters.softness / rows[at_row(i) + AT_CORNERS].w, i == j);
-    }
-    workgroupBarrier();
+    return max(least_of(upper, local), 0.0);
 }
 
 // Displaces the nodes of the own row by the forces of all rows.
@@ -94,23 +39,49 @@ fn has_row(node: u32, count: u32) -> bool {
     return false;
 }
 
-// Adds a row for each proxy node without one that the surface has reached, which moves no farther than `moved`.
-fn add_rows(configuration: u32, count: u32, moved: f32, local: u32) {
+// Adds a row for each proxy node without one that the surface has reached, behind the `count` rows that there are. No
+// node matters that is farther than `reach` at rest. Returns the smallest gap at rest of these nodes.
+fn add_rows(configuration: u32, count: u32, reach: f32, local: u32) -> f32 {
+    var gap = FAR_AWAY;
     for (var first = 0u; first < parameters.proxy_nodes; first += WORKGROUP) {
         let node = first + local;
         var is_reached = false;
         if node < parameters.proxy_nodes {
             let x = node_at(configuration, node);
             let bounds = bounds_at(x);
-            let may_be = bounds.lower - radius_of(node) <= moved && !has_row(node, count);
-            if may_be && find_row(node, x, bounds.near) && own.depth >= -moved {
-                take_places();
-                displace_by_forces(count);
-                is_reached = own.depth + dot(own.normal, own_moved()[0]) > 0.0;
+            if bounds.lower - radius_of(node) <= reach && !has_row(node, count) {
+                let found = closest_facet(x, bounds.near);
+                if found.facet != ABSENT {
+                    let outward = pseudonormal(found.facet, found.point, x);
+                    make_row(x, radius_of(node), found.facet, found.point, outward);
+                    take_places();
+                    displace_by_forces(count);
+                    gap = min(gap, -own.depth);
+                    is_reached = own.depth + dot(own.normal, own_moved()[0]) > 0.0;
+                }
             }
         }
-        add_row(node, is_reached, local);
+        let place = place_in_list(is_reached, local);
+        if is_reached && place < ROOM {
+            store_row(place, node);
+        }
     }
+    return least_of(gap, local);
+}
+
+// Sets the entries of S for the rows from `first` on, of `count` in all.
+fn couple(first: u32, count: u32, local: u32) {
+    workgroupBarrier();
+    for (var place = entry(first, 0u) + local; place < entry(count, 0u); place += WORKGROUP) {
+        var i = u32((sqrt(8.0 * f32(place) + 1.0) - 1.0) * 0.5);
+        i = select(i, i + 1u, entry(i + 1u, 0u) <= place);
+        i = select(i, i - 1u, entry(i, 0u) > place);
+        let j = place - entry(i, 0u);
+        take_row(i);
+        take_places();
+        matrix[place] = coupling(j) + select(0.0, parameters.softness / rows[at_row(i) + AT_CORNERS].w, i == j);
+    }
+    workgroupBarrier();
 }
 
 // Whether the compliance covers all facets within `radius` of x.
@@ -179,24 +150,28 @@ fn main(
     if configuration >= parameters.configurations {
         return;
     }
-    let detected = detect(configuration, local);
-    let gap = detected.gap;
-    if gap > -parameters.band || detected.count > ROOM {
-        if local == 0u {
-            let status = select(STATUS_FREE, STATUS_OVERFLOW, detected.count > ROOM);
-            write_head(configuration, status, 0u, gap);
-        }
-        return;
-    }
-    place_joints(configuration, local);
-    var known = 0u;
-    var count = detected.count;
+    var count = 0u;
     var rounds = 0u;
     var status = STATUS_CONTACT;
+    var gap = 0.0;
     var energy = 0.0;
-    var moved = 0.0;
+    var reach = bound_of_gap(configuration, local);
     loop {
-        couple(known, count, local);
+        let nearest = add_rows(configuration, count, reach, local);
+        gap = select(gap, nearest, count == 0u);
+        if listed > ROOM {
+            status = STATUS_OVERFLOW;
+            break;
+        }
+        if gap > -parameters.band {
+            status = STATUS_FREE;
+            break;
+        }
+        if listed == count {
+            break;
+        }
+        couple(count, listed, local);
+        count = listed;
         let ended = solve_program(count, local);
         rounds += ended.rounds;
         if !ended.is_solved {
@@ -211,17 +186,7 @@ fn main(
             elastic -= 0.5 * force * force * parameters.softness / rows[at_row(row) + AT_CORNERS].w;
         }
         elastic += energy;
-        moved = MOTION_SLACK * sqrt(2.0 * max(elastic, 0.0)) * parameters.mobility + parameters.band;
-        add_rows(configuration, count, moved, local);
-        known = count;
-        count = listed;
-        if count > ROOM {
-            status = STATUS_OVERFLOW;
-            break;
-        }
-        if count == known {
-            break;
-        }
+        reach = MOTION_SLACK * sqrt(2.0 * max(elastic, 0.0)) * parameters.mobility + parameters.band;
     }
     if status != STATUS_CONTACT {
         if local == 0u {
@@ -229,30 +194,38 @@ fn main(
         }
         return;
     }
+    place_joints(configuration, local);
     var off = 0.0;
     var deepest = 0.0;
     var is_within = true;
-    for (var row = local; row < count; row += WORKGROUP) {
-        let force = solution[row];
-        deepest = max(deepest, rows[at_row(row) + AT_X].w);
-        off = max(off, select(slack[row], abs(slack[row]), force > 0.0));
+    for (var first = 0u; first < count; first += WORKGROUP) {
+        let row = first + local;
+        var force = 0.0;
+        if row < count {
+            force = solution[row];
+            deepest = max(deepest, rows[at_row(row) + AT_X].w);
+            off = max(off, select(slack[row], abs(slack[row]), force > 0.0));
+        }
         if force > 0.0 {
             take_row(row);
             take_places();
             displace_by_forces(count);
             rows[at_row(row) + AT_FORCE] = vec4<f32>(force * own_push(), 0.0);
             let node = row_names[row].x;
-            let radius = abs(own.depth - radius_of(node)) + 2.0 * moved + parameters.bulge;
+            let radius = abs(own.depth - radius_of(node)) + 2.0 * reach + parameters.bulge;
             is_within = is_within && (WHOLE || is_covered(own.x, radius));
         }
+        if WITH_TANGENT {
+            add_tangent(row, force, count, local);
+        }
+    }
+    if WITH_TANGENT {
+        take_off_response(count, local);
     }
     let residual = -least_of(-off, local) / max(-least_of(-deepest, local), LEAST_DIVISOR);
     let is_doubtful = least_of(select(0.0, 1.0, is_within), local) == 0.0;
     if is_doubtful {
         status = STATUS_OVERFLOW;
-    }
-    if WITH_TANGENT {
-        find_tangent(count, local);
     }
     let at = configuration * record_length();
     if local == 0u {

@@ -29,34 +29,37 @@ fn followed(point: ClosestPoint) -> ClosestPoint {
     return found;
 }
 
-// Direction in which the node of stored row `row` is pushed at x. The own row is spoilt.
-fn push_at(row: u32, x: vec3<f32>) -> vec3<f32> {
-    let stored = row_names[row];
-    form(stored.y, x);
-    let point = followed(ClosestPoint(rows[at_row(row) + AT_CORNERS].xyz, stored.z));
-    let outward = select(rows[at_row(row) + AT_NORMAL].xyz, normal_of(jet_at(point.weights)), stored.z == FEATURE_FACE);
-    make_row(x, 0.0, stored.y, point, outward);
-    return own_push();
-}
-
-// Second derivative of the depth of row `row` in the place of its node, the displacement held.
+// Second derivative of the depth of row `row` in the place of its node, the displacement held. The own row, which is
+// that row, is spoilt.
 fn second_derivative(row: u32) -> mat3x3<f32> {
-    if !SMOOTH && row_names[row].z == FEATURE_FACE {
+    let named = row_names[row];
+    // A smooth surface goes on beyond the edges of a facet as the facet does.
+    let feature = select(named.z, FEATURE_FACE, SMOOTH);
+    if !SMOOTH && feature == FEATURE_FACE {
         return mat3x3<f32>();
     }
     let x = rows[at_row(row) + AT_X].xyz;
-    _ = push_at(row, x);
-    // So that the closest point moves by the step.
-    var step = parameters.step * clamp(own_convexity, LEAST_CONVEXITY, 1.0);
-    if row_names[row].z != FEATURE_FACE {
-        // The direction from an edge or vertex turns over its distance.
-        step = min(step, TURNING_STEP * max(abs(rows[at_row(row) + AT_X].w - radius_of(row_names[row].x)),
-            parameters.least_distance));
-    }
+    let normal = rows[at_row(row) + AT_NORMAL].xyz;
+    var step = 0.0;
     var bend = mat3x3<f32>();
-    for (var axis = 0u; axis < 3u; axis += 1u) {
-        let along = step * one_hot(axis);
-        bend[axis] = (push_at(row, x - along) - push_at(row, x + along)) / (2.0 * step);
+    // At x itself, and on both sides of it along each axis.
+    for (var k = 0u; k < 7u; k += 1u) {
+        let axis = (k + 2u) % 3u;
+        let sign = select(-1.0, 1.0, k > 3u);
+        let there = x + step * sign * one_hot(axis);
+        form(named.y, there);
+        let point = followed(ClosestPoint(rows[at_row(row) + AT_CORNERS].xyz, feature));
+        let outward = select(normal, normal_of(jet_at(point.weights)), feature == FEATURE_FACE);
+        make_row(there, 0.0, named.y, point, outward);
+        if k > 0u {
+            bend[axis] -= own_push() * (sign / (2.0 * step));
+        } else if feature == FEATURE_FACE {
+            // So that the closest point moves by the step.
+            step = parameters.step * clamp(own_convexity, LEAST_CONVEXITY, 1.0);
+        } else {
+            // The direction from an edge or vertex turns over its distance.
+            step = min(parameters.step, TURNING_STEP * max(abs(own.depth), parameters.least_distance));
+        }
     }
     return 0.5 * (bend + transpose(bend));
 }
@@ -96,61 +99,52 @@ fn displace_by_joint(count: u32, k: u32) {
     }
 }
 
-// Finds the tangent of the first `count` rows, whose forces are known. For all invocations together.
-fn find_tangent(count: u32, local: u32) {
+// Adds what row `row`, the own one, brings to the tangent, if its `force` is not zero, and notes by how much joints
+// deepen it. For all invocations together.
+fn add_tangent(row: u32, force: f32, count: u32, local: u32) {
     let joints = parameters.joints;
-    for (var k = local; k < ENTRIES; k += WORKGROUP) {
-        tangent_sums[k] = 0.0;
+    var pushed = vec3<f32>(0.0);
+    var bend = mat3x3<f32>();
+    if force > 0.0 {
+        pushed = rows[at_row(row) + AT_FORCE].xyz;
+        bend = force * second_derivative(row);
+        take_row(row);
     }
-    for (var first = 0u; first < count; first += WORKGROUP) {
-        let row = first + local;
-        var force = 0.0;
-        if row < count {
-            force = solution[row];
-        }
-        var pushed = vec3<f32>(0.0);
-        var bend = mat3x3<f32>();
+    for (var k = 0u; k < joints; k += 1u) {
+        var moved = array<vec3<f32>, 3>();
+        var column = vec3<f32>(0.0);
+        var deepened = 0.0;
         if force > 0.0 {
-            take_row(row);
-            take_places();
-            displace_by_forces(count);
-            bend = force * second_derivative(row);
-            take_row(row);
-            pushed = rows[at_row(row) + AT_FORCE].xyz;
+            displace_by_joint(count, k);
+            moved = own_moved();
+            column = jacobian_column(row_names[row].x, own.x, k);
+            deepened = -dot(pushed, column) / force - dot(own.normal, moved[0]);
         }
-        for (var k = 0u; k < joints; k += 1u) {
-            var moved = array<vec3<f32>, 3>();
-            var column = vec3<f32>(0.0);
+        if row < count {
+            deepening[row * joints + k] = deepened;
+        }
+        for (var l = 0u; l <= k; l += 1u) {
+            var part = 0.0;
             if force > 0.0 {
-                displace_by_joint(count, k);
-                moved = own_moved();
-                column = jacobian_column(row_names[row].x, own.x, k);
-            }
-            if row < count {
-                deepening[row * joints + k] = 0.0;
-                if force > 0.0 {
-                    deepening[row * joints + k] = -dot(pushed, column) / force - dot(own.normal, moved[0]);
+                let other = jacobian_column(row_names[row].x, own.x, l);
+                let load = load_of(row, l);
+                let along = vec2<f32>(dot(own.normal, moved[1]), dot(own.normal, moved[2]));
+                part = force * (dot(load.point, moved[0]) + dot(load.tangents, along)) - dot(other, bend * column);
+                if !slides(l) {
+                    part += dot(pushed, cross(axes[l], column));
                 }
             }
-            for (var l = 0u; l <= k; l += 1u) {
-                var part = 0.0;
-                if force > 0.0 {
-                    let other = jacobian_column(row_names[row].x, own.x, l);
-                    let load = load_of(row, l);
-                    let along = vec2<f32>(dot(own.normal, moved[1]), dot(own.normal, moved[2]));
-                    part = force * (dot(load.point, moved[0]) + dot(load.tangents, along)) - dot(other, bend * column);
-                    if !slides(l) {
-                        part += dot(pushed, cross(axes[l], column));
-                    }
-                }
-                let sum = sum_of(part, local);
-                if local == 0u {
-                    tangent_sums[entry(k, l)] += sum;
-                }
+            let sum = sum_of(part, local);
+            if local == 0u {
+                tangent_sums[entry(k, l)] += sum;
             }
         }
     }
-    // What is solved for is the change of the forces.
+}
+
+// Takes off the tangent what the forces give way where joints move. For all invocations together.
+fn take_off_response(count: u32, local: u32) {
+    let joints = parameters.joints;
     for (var k = 0u; k < joints; k += 1u) {
         workgroupBarrier();
         for (var i = local; i < count; i += WORKGROUP) {

@@ -9,9 +9,9 @@ use super::{
     kernel::Kernel,
     layout::Parameters,
     model::RestModel,
-    shaders,
+    shaders::{self, MOST_CARRIERS},
 };
-use crate::{JointVector, contact, scene::JointKind};
+use crate::{JointVector, MAX_JOINTS, contact, scene::JointKind};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 
@@ -99,16 +99,24 @@ impl RestDevice {
     pub fn new(context: Arc<Context>, model: &contact::Model<'_>, capacity: BatchCapacity) -> Result<Self, GpuError> {
         let uploaded = RestModel::new(&context, model)?;
         let parameters = uploaded.parameters;
-        let own = if context.adapter().hardware { BatchCapacity::default() } else { SOFTWARE };
-        let joints = if model.with_tangent { parameters.joints } else { 0 };
+        let is_hardware = context.adapter().hardware;
+        let own = if is_hardware { BatchCapacity::default() } else { SOFTWARE };
+        // A power of two, so that few kernels are compiled; a software rasteriser, which compiles for longer than it
+        // computes, has one size for all scenes.
+        let [nodes, carriers, joints] = if is_hardware {
+            [model.chain.nodes.len().next_power_of_two() as u32, parameters.carriers, parameters.joints]
+        } else {
+            [u32::MAX, MOST_CARRIERS / 4, MAX_JOINTS as u32]
+        };
+        let joints = if model.with_tangent { joints } else { 0 };
         let memory = context.workgroup_memory();
-        let fits = |rows: &u32| workgroup_memory(*rows, parameters.carriers, joints) <= memory;
-        let most = capacity.rows.min(own.rows).min(model.chain.nodes.len()).max(1) as u32;
+        let fits = |rows: &u32| workgroup_memory(*rows, carriers, joints) <= memory;
+        let most = nodes.min(capacity.rows.min(own.rows) as u32).max(1);
         let rows = (1..=most).rev().find(fits).unwrap_or(1);
         let flag = |is_set: bool| f64::from(u8::from(is_set));
         let overrides = [
             ("ROOM", f64::from(rows)),
-            ("ROW_FOURS", f64::from(rows * row_fours(parameters.carriers))),
+            ("ROW_FOURS", f64::from(rows * row_fours(carriers))),
             ("DEEPENINGS", f64::from((rows * joints).max(1))),
             ("SMOOTH", flag(model.surface.smooth.is_some())),
             ("ISOTROPIC", flag(model.compliance.rows_per_node == 1)),

@@ -4,7 +4,7 @@ use crate::fixture::{context, load, load_of, on_grid};
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, Proximity, Solver, Status},
+    contact::{Equilibrium, Model, Solver, Status},
     gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver},
     joint_matrix::lower,
     object::{Compliance, Object},
@@ -104,8 +104,8 @@ fn difference(cpu: &[Equilibrium], gpu: &[Equilibrium], nodes: usize) -> Option<
 }
 
 /// Solves `configurations` on both sides; asserts agreement, and that at most one in `share` of those in contact is left
-/// to the CPU. Returns the CPU's results.
-fn check(what: &str, model: &Model, configurations: &[JointVector], share: usize) -> Vec<Equilibrium> {
+/// to the CPU.
+fn check(what: &str, model: &Model, configurations: &[JointVector], share: usize) {
     let mut cpu = Solver::new(model);
     let reference: Vec<Equilibrium> = configurations.iter().map(|q| cpu.solve(q)).collect();
     let mut gpu = GpuSolver::new(context(), model).unwrap();
@@ -117,40 +117,30 @@ fn check(what: &str, model: &Model, configurations: &[JointVector], share: usize
     assert!(touching >= 15, "{what}: only {touching} configurations in contact");
     assert_eq!(difference(&reference, &results, model.object.rest.len()), None, "{what}");
     assert!(gpu.left_to_cpu() * share <= touching, "{what}: {} left to the CPU", gpu.left_to_cpu());
-    reference
 }
 
-/// Flat and bent facets, points and balls, springs and a solid, with tangents and without; and nodes that the bulged
-/// surface reaches.
+/// Flat and bent facets, points and balls, springs and a solid, with tangents and without.
 #[test]
 fn all_scenes_have_the_same_equilibria_on_gpu_and_cpu() {
-    let mut reached = 0;
     for (name, material, surface, stride) in [
         ("sphere.toml", None, ContactSurface::Facets, 131),
         ("sphere.toml", None, ContactSurface::Smooth, 131),
-        ("sphere.toml", Some(AXIAL), ContactSurface::Facets, 131),
         ("sphere.toml", Some(SOLID), ContactSurface::Smooth, 131),
         ("mesh.toml", None, ContactSurface::Smooth, 101),
-        ("mesh.toml", None, ContactSurface::Facets, 101),
         ("touch.toml", None, ContactSurface::Smooth, 19),
-        ("organ.toml", None, ContactSurface::Smooth, 197),
-        ("nodule.toml", None, ContactSurface::Smooth, 197),
-        ("sponge_side.toml", None, ContactSurface::Smooth, 97),
+        ("organ.toml", None, ContactSurface::Smooth, 7),
     ] {
         let (scene, object, chain) = load_of(name, material);
         let mut model = Model::new(&object, &chain, ContactSpec { surface, ..scene.contact });
         model.with_tangent = surface == ContactSurface::Smooth;
-        let configurations = on_grid(&scene, 11, stride);
-        let what = format!("{name}, {surface:?}, {} a node", model.compliance.rows_per_node);
-        let reference = check(&what, &model, &configurations, 20);
-        let mut proximity = Proximity::new(&model);
-        for (q, result) in configurations.iter().zip(&reference) {
-            proximity.gap(q);
-            let clearances: Vec<f64> = proximity.clearances().collect();
-            reached += result.touches.iter().filter(|touch| clearances[touch.proxy_node as usize] > 0.0).count();
+        // Beside the grid: on it symmetric arms touch edges of symmetric meshes, and rounding decides on which facet.
+        let mut configurations = on_grid(&scene, 11, stride);
+        for q in &mut configurations {
+            q.iter_mut().zip(&scene.grid.axes).for_each(|(x, axis)| *x += 0.37 * axis.step);
         }
+        let what = format!("{name}, {surface:?}, {} a node", model.compliance.rows_per_node);
+        check(&what, &model, &configurations, 20);
     }
-    assert!(reached > 20, "only {reached} nodes are reached by the bulged surface");
 }
 
 /// In stiff contact the matrix of the program is nearly singular where nodes are closer than the body resolves.
@@ -219,7 +209,8 @@ fn contact_within_rounding_of_none_is_decided_in_f64() {
     for name in ["sphere.toml", "mesh.toml"] {
         let (scene, object, chain) = load(name);
         let path = on_grid(&scene, 11, 101);
-        let model = Model::new(&object, &chain, scene.contact);
+        let mut model = Model::new(&object, &chain, scene.contact);
+        model.with_tangent = name == "mesh.toml";
         let mut cpu = Solver::new(&model);
         for wanted in [-1e-9, -1e-11, 1e-11, 1e-9] {
             let near = grazing(&mut cpu, &path, wanted);

@@ -84,16 +84,7 @@ fn a_refined_bake_names_the_gpu_that_solved() {
     std::fs::write(folder.path().join("small.toml"), scene).unwrap();
     let bake = |backend: &str| -> serde_json::Value {
         let mut program = Command::new(env!("CARGO_BIN_EXE_haptize"));
-        program.current_dir(folder.path()).args([
-            "bake",
-            "small.toml",
-            "--max-error",
-            "5%",
-            "--refine",
-            "2",
-            "--geometry",
-            "rest",
-        ]);
+        program.current_dir(folder.path()).args(["bake", "small.toml", "--max-error", "5%", "--refine", "2"]);
         let output = program.args(["--backend", backend, "--json"]).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice(&output.stdout).unwrap()

