@@ -218,6 +218,10 @@ pub static FRAME_STIFFENING: Shader = stage(
     &[&[("FACTOR", 8.0), ("STRAIN", 0.1)]],
 );
 
+/// Frame update: nodes that follow those of K.
+pub static FRAME_SURFACE: Shader =
+    stage("frame_surface", "main", &[include_str!("../../shaders/frame_surface.wgsl")], &[&[]]);
+
 /// Frame update by the inverse: right-hand side.
 pub static FRAME_LOAD: Shader = stage("frame", "load", &[FRAME_COMMON, FRAME], INVERSES);
 
@@ -252,6 +256,7 @@ pub static ALL: &[&[Shader]] = &[
     &SEARCH_GATHER,
     std::slice::from_ref(&DETECTION),
     std::slice::from_ref(&FRAME_STIFFENING),
+    std::slice::from_ref(&FRAME_SURFACE),
     std::slice::from_ref(&FRAME_LOAD),
     std::slice::from_ref(&FRAME_ADVANCE),
     std::slice::from_ref(&FRAME_BEGIN),
