@@ -22,7 +22,8 @@ use haptize::{
     object::Object,
     render::object_motion::ObjectMotion,
     scene::{
-        GraphicsEffects, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec, StiffeningSpec,
+        GraphicsEffects, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SpringKind, SpringSpec,
+        StiffeningSpec,
     },
 };
 use std::{sync::Arc, time::Instant};
@@ -38,7 +39,7 @@ fn sphere(kind: SpringKind, rings: usize) -> Object {
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings, segments: rings },
         material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
         skin: None,
-        ground: Some(GroundSpec { stiffness: 90.0, nodes: GroundNodes::All }),
+        ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(90.0), nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: 0.02,
     })

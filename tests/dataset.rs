@@ -70,6 +70,7 @@ fn sample() -> Dataset {
             solid: Some(Solid {
                 inner_nodes: vec![0.1, 0.2, 1.0 / 3.0].into(),
                 tetrahedra: vec![0, 1, 2, 4, 0, 2, 3, 4].into(),
+                mid_nodes: vec![0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1].into(),
                 regions: vec![3, 1].into(),
             }),
         }),
@@ -135,6 +136,7 @@ fn contents(dataset: &Dataset) -> Vec<(&'static str, Option<Vec<u8>>)> {
         ("triangles", surface.map(|s| bits(&s.triangles))),
         ("inner nodes", solid.map(|s| bits(&s.inner_nodes))),
         ("tetrahedra", solid.map(|s| bits(&s.tetrahedra))),
+        ("nodes in the middles of edges", solid.map(|s| bits(&s.mid_nodes))),
     ]
 }
 
@@ -341,6 +343,7 @@ fn hostile_numbers() -> Vec<Hostile> {
         ("a corner of the surface nowhere", write("surface_nodes", 0, f64::NAN.to_le_bytes().into()), "surface_nodes"),
         ("a triangle on a node that is not", write("surface_triangles", 3, 4_u32.to_le_bytes().into()), "node 4, of 4"),
         ("a tetrahedron on a node that is not", write("tetrahedra", 7, 5_u32.to_le_bytes().into()), "node 5, of 5"),
+        ("an edge's node that is not", write("mid_nodes", 3, 5_u32.to_le_bytes().into()), "node 5, of 5"),
         ("an inner node nowhere", write("inner_nodes", 2, f64::INFINITY.to_le_bytes().into()), "inner_nodes"),
         ("tetrahedra without inner nodes", Box::new(|header, _| rename(header, "inner_nodes", "i")), "inner_nodes"),
         ("a contact on a node that is not", write("contact_nodes", 1, u32::MAX.to_le_bytes().into()), "contact_nodes"),

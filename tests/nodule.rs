@@ -10,21 +10,26 @@ use haptize::{
     dataset::Surface,
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{ElasticSpec, GroundNodes, GroundSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Scene, Shape},
+    scene::{
+        ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec,
+        Scene, Shape,
+    },
     sweep::Inspection,
 };
 use std::fmt::Write;
 
 const YOUNG: f64 = 2e4;
-/// Ground stiffness that keeps the solid in place and hardly adds to it (N/m).
-const LIGHT: f64 = 1e-4;
+/// Ground per area that keeps the solid in place and hardly adds to it (N/m^3).
+const LIGHT: f64 = 100.0;
 
+/// A solid that is held below z = 1 nm, which for a box is its underside, or as a whole.
 fn spec(shape: Shape, poisson: f64, cell: Option<f64>, inclusions: Vec<InclusionSpec>) -> ObjectSpec {
+    let underside = if matches!(shape, Shape::Icosphere { .. }) { f64::INFINITY } else { 1e-9 };
     ObjectSpec {
         shape,
         material: Material::Elastic(ElasticSpec { young: YOUNG, poisson, cell, inclusions }),
         skin: None,
-        ground: Some(GroundSpec { stiffness: LIGHT, nodes: GroundNodes::All }),
+        ground: Some(GroundSpec { stiffness: GroundStiffness::PerArea(LIGHT), nodes: GroundNodes::Below(underside) }),
         node_mass: 0.01,
         node_damping: 0.1,
     }
@@ -34,12 +39,11 @@ fn sphere(centre: DVec3, radius: f64, young: f64, poisson: f64) -> InclusionSpec
     InclusionSpec { place: InclusionPlace::Sphere { centre, radius }, young, poisson }
 }
 
-/// Elastic forces under the displacement `u`, the ground's left out.
+/// Forces on the nodes of K under the displacement `u`.
 fn forces(object: &Object, u: impl Fn(DVec3) -> DVec3) -> Vec<DVec3> {
-    let displacement: Vec<DVec3> = object.rest.iter().map(|x| u(*x)).collect();
+    let displacement: Vec<DVec3> = object.moved.iter().map(|x| u(*x)).collect();
     let mut forces = vec![DVec3::ZERO; displacement.len()];
     object.stiffness.apply(&displacement, &mut forces);
-    forces.iter_mut().zip(&displacement).for_each(|(force, u)| *force -= LIGHT * *u);
     forces
 }
 
@@ -97,7 +101,7 @@ fn check_series(object: &Object, height: f64, interface: f64, area: f64, young: 
         DVec3::Z * stress * (low / young[0] + high / young[1])
     };
     let mut top = DVec3::ZERO;
-    for (x, force) in object.rest.iter().zip(forces(object, stretch)) {
+    for (x, force) in object.moved.iter().zip(forces(object, stretch)) {
         if x.z > height - 1e-6 {
             top += force;
         } else if x.z > 1e-6 {
@@ -167,27 +171,35 @@ fn an_inclusion_like_the_rest_changes_nothing() {
 fn a_composite_sphere_has_hashins_bulk_modulus() {
     let bulk = |young: f64, poisson: f64| young / (3.0 * (1.0 - 2.0 * poisson));
     let radial = |object: &Object| {
-        let mut u = vec![DVec3::ZERO; object.rest.len()];
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
         for triangle in &object.triangles {
             let [a, b, c] = triangle.map(|node| object.rest[node as usize]);
             let force = 0.5 * (b - a).cross(c - a) / 3.0;
-            triangle.iter().for_each(|&node| u[node as usize] += force);
+            triangle.iter().for_each(|&node| forces[node as usize] += force);
         }
+        let mut u = vec![DVec3::ZERO; object.moved.len()];
+        object.attachment.spread(&forces, &mut u);
         object.factor.solve(&mut u);
-        let outward = |node: usize| u[node].dot(object.rest[node].normalize());
+        let outward = |node: usize| object.attachment.follow(node, &u).dot(object.rest[node].normalize());
         (0..object.surface_nodes).map(outward).sum::<f64>() / object.surface_nodes as f64
     };
+    let plain = [0.02, 0.01].map(|cell| ball(cell, vec![]).unwrap());
+    let cone = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|node| plain[0].rest[node as usize]);
+        a.dot(b.cross(c)) / 6.0
+    };
+    let volume: f64 = plain[0].triangles.iter().map(cone).sum();
     for (factor, poisson, part) in [(10.0, 0.3, 0.6), (10.0, 0.2, 0.8), (0.1, 0.3, 0.6)] {
-        let (km, ki, c) = (bulk(YOUNG, 0.3), bulk(factor * YOUNG, poisson), f64::powi(part, 3));
+        let radius = 0.05 * part;
+        let c = 4.0 / 3.0 * std::f64::consts::PI * f64::powi(radius, 3) / volume;
+        let (km, ki) = (bulk(YOUNG, 0.3), bulk(factor * YOUNG, poisson));
         let shear = 4.0 * YOUNG / (2.0 * 1.3);
         let hashin = 1.0 + c * (ki - km) / km * (3.0 * km + shear) / (3.0 * km + shear + 3.0 * (1.0 - c) * (ki - km));
-        let inner = sphere(DVec3::ZERO, 0.05 * part, factor * YOUNG, poisson);
-        let error =
-            |cell: f64| radial(&ball(cell, vec![]).unwrap()) / radial(&ball(cell, vec![inner]).unwrap()) / hashin - 1.0;
-        let errors = [0.01, 0.005].map(error);
+        let inner = sphere(DVec3::ZERO, radius, factor * YOUNG, poisson);
+        let errors = [(0.02, &plain[0]), (0.01, &plain[1])]
+            .map(|(cell, plain)| radial(plain) / radial(&ball(cell, vec![inner]).unwrap()) / hashin - 1.0);
         println!("{factor} {poisson} {part}: {errors:?} of {hashin}");
-        // Cut cells are too stiff, by less in smaller ones.
-        assert!(errors[1] > 0.0 && errors[1] < 0.7 * errors[0] && errors[1] < 0.08, "{errors:?}");
+        assert!(errors.iter().all(|error| error.abs() < 0.03), "{errors:?}");
     }
 }
 
@@ -198,9 +210,8 @@ fn the_last_of_overlapping_inclusions_counts() {
     let (plain, hollow) = (ball(vec![]).unwrap(), ball(vec![stiff, core]).unwrap());
     // Near the middle the core is like the plain ball, and farther out it is not.
     let same = |near: DVec3| {
-        let node = (0..plain.rest.len())
-            .skip(plain.surface_nodes)
-            .min_by(|&a, &b| plain.rest[a].distance(near).total_cmp(&plain.rest[b].distance(near)));
+        let node = (0..plain.moved.len())
+            .min_by(|&a, &b| plain.moved[a].distance(near).total_cmp(&plain.moved[b].distance(near)));
         let rows = node.into_iter().flat_map(|node| plain.stiffness.row(node).zip(hollow.stiffness.row(node)));
         rows.into_iter()
             .all(|((_, a), (_, b))| (*a - *b).to_cols_array().iter().all(|x| x.abs() < 1e-12 * plain.stiffness.norm()))
@@ -232,7 +243,7 @@ fn a_finger_finds_the_nodule() {
     // The nodule lies at x = 12 mm, which a finger of 120 mm reaches at 0.1 rad.
     assert!((yaw - 0.1).abs() < 0.03, "most torque, {most}, at {yaw} rad");
     // As far from the middle on the other side.
-    assert!(*most > 1.15 * torques[5], "{most} over the nodule, {} beside: {torques:?}", torques[5]);
+    assert!(*most > 1.08 * torques[5], "{most} over the nodule, {} beside: {torques:?}", torques[5]);
 }
 
 #[test]

@@ -19,7 +19,10 @@ use haptize::{
         trace::{Frame, Tick, Trace},
     },
     report::{self},
-    scene::{GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec},
+    scene::{
+        GroundNodes, GroundSpec, GroundStiffness, JointKind, JointSpec, Material, ObjectSpec, Shape, SpringKind,
+        SpringSpec,
+    },
 };
 use resvg::{
     tiny_skia::{Pixmap, Rect, Transform},
@@ -36,7 +39,7 @@ fn sphere() -> Object {
         shape,
         material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 }),
         skin: None,
-        ground: Some(GroundSpec { stiffness: 100.0, nodes: GroundNodes::All }),
+        ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(100.0), nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: 0.1,
     })

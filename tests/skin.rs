@@ -6,7 +6,8 @@
 use glam::DVec3;
 use haptize::object::{Compliance, Object, ObjectError};
 use haptize::scene::{
-    ElasticSpec, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SkinSpec, SpringKind, SpringSpec,
+    ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SkinSpec, SpringKind,
+    SpringSpec,
 };
 
 const CENTRE: DVec3 = DVec3::new(0.1, -0.2, 0.3);
@@ -201,15 +202,16 @@ fn skins_of_isotropic_objects_keep_the_small_compliance() {
 fn a_skin_adds_to_springs_and_to_solids_what_it_is_alone() {
     let solid = Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.4, cell: Some(0.02), inclusions: Vec::new() });
     let springs = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 150.0 });
-    let ground = Some(GroundSpec { stiffness: 50.0, nodes: GroundNodes::All });
+    let ground = Some(GroundSpec { stiffness: GroundStiffness::PerNode(50.0), nodes: GroundNodes::All });
     let alone = build(&hollow(3, SKIN));
     for material in [solid, springs] {
         let both = ObjectSpec { material, ground: ground.clone(), ..hollow(3, SKIN) };
         let bare = build(&ObjectSpec { skin: None, ..both.clone() });
         let both = build(&both);
         assert!(bare.skin.is_none() && both.skin == alone.skin);
-        let field = noise(both.rest.len(), 3);
-        let expected = bare.stiffness.energy(&field) + alone.stiffness.energy(&field[..alone.rest.len()]);
+        let field = noise(both.moved.len(), 3);
+        let followers: Vec<DVec3> = (0..alone.rest.len()).map(|node| both.attachment.follow(node, &field)).collect();
+        let expected = bare.stiffness.energy(&field) + alone.stiffness.energy(&followers);
         assert!((both.stiffness.energy(&field) / expected - 1.0).abs() < 1e-12);
     }
 }

@@ -278,8 +278,8 @@ mod tests {
     use crate::proxy::Chain;
     use crate::random::sequence;
     use crate::scene::{
-        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, JointKind, JointSpec, Material, ObjectSpec,
-        ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
+        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, GroundStiffness, JointKind, JointSpec,
+        Material, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
     fn ball() -> Object {
@@ -287,7 +287,7 @@ mod tests {
             shape: Shape::Sphere { centre: DVec3::new(1.0, -2.0, 0.5), radius: 0.05, rings: 10, segments: 10 },
             material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness: 300.0 }),
             skin: None,
-            ground: Some(GroundSpec { stiffness: 100.0, nodes: GroundNodes::All }),
+            ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(100.0), nodes: GroundNodes::All }),
             node_mass: 0.01,
             node_damping: 0.1,
         })

@@ -42,10 +42,15 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
 fn check_surface(surface: &Surface) -> Result<(), String> {
     let Surface { nodes, triangles, solid } = surface;
     within(Stored::SurfaceTriangles, triangles, nodes.len() / 3)?;
-    let Some(Solid { inner_nodes, tetrahedra, regions }) = solid else { return Ok(()) };
+    let Some(Solid { inner_nodes, tetrahedra, mid_nodes, regions }) = solid else { return Ok(()) };
     if !regions.is_empty() && regions.len() != tetrahedra.len() / 4 {
         return Err(format!("the solid has {} tetrahedra, but regions of {}", tetrahedra.len() / 4, regions.len()));
     }
+    if !mid_nodes.is_empty() && mid_nodes.len() / 6 != tetrahedra.len() / 4 {
+        let (edges, all) = (mid_nodes.len() / 6, tetrahedra.len() / 4);
+        return Err(format!("the solid has {all} tetrahedra, but nodes in the middles of the edges of {edges}"));
+    }
+    within(Stored::MidNodes, mid_nodes, (nodes.len() + inner_nodes.len()) / 3)?;
     within(Stored::Tetrahedra, tetrahedra, (nodes.len() + inner_nodes.len()) / 3)
 }
 

@@ -107,6 +107,8 @@ pub struct Solid {
     pub inner_nodes: Column<f64>,
     /// Four node numbers a tetrahedron.
     pub tetrahedra: Column<u32>,
+    /// Six more, of the nodes in the middles of its edges; empty where the edges are straight.
+    pub mid_nodes: Column<u32>,
     /// Physical volume of each tetrahedron; empty where the mesh names none.
     pub regions: Column<u32>,
 }

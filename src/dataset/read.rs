@@ -245,6 +245,7 @@ impl Arrays<'_> {
             Some(tetrahedra) => Some(Solid {
                 inner_nodes: self.required(Stored::InnerNodes)?,
                 tetrahedra,
+                mid_nodes: self.optional(Stored::MidNodes)?.unwrap_or_else(|| Vec::new().into()),
                 regions: self.optional(Stored::Regions)?.unwrap_or_else(|| Vec::new().into()),
             }),
         };

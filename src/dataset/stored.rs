@@ -25,12 +25,13 @@ pub(crate) enum Stored {
     SurfaceTriangles,
     InnerNodes,
     Tetrahedra,
+    MidNodes,
     Regions,
 }
 
 use Stored::{
-    ContactForces, ContactNodes, ContactOffsets, Energy, Gap, InnerNodes, Iterations, Regions, Residual, Status,
-    SurfaceNodes, SurfaceTriangles, Tangent, Tetrahedra, Torque, TouchForces, TouchNodes, TouchOffsets,
+    ContactForces, ContactNodes, ContactOffsets, Energy, Gap, InnerNodes, Iterations, MidNodes, Regions, Residual,
+    Status, SurfaceNodes, SurfaceTriangles, Tangent, Tetrahedra, Torque, TouchForces, TouchNodes, TouchOffsets,
 };
 
 /// Arrays of the contact forces on the object: ends of the rows, nodes and forces.
@@ -90,7 +91,7 @@ const POINT: &[(&str, usize)] = &[("point", 0)];
 const NODE: &[(&str, usize)] = &[("node", 0), ("xyz", 3)];
 
 /// By [`Stored`].
-const DESCRIPTIONS: [Description; 18] = [
+const DESCRIPTIONS: [Description; 19] = [
     of(Torque, "torque", Dtype::F64, Axes::Joints("joint"), Unit::Effort),
     of(Energy, "energy", Dtype::F64, Axes::Grid, Unit::Of("J")).or_absent("stored energy"),
     of(Tangent, "tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness),
@@ -108,6 +109,7 @@ const DESCRIPTIONS: [Description; 18] = [
     of(SurfaceTriangles, "surface_triangles", Dtype::U32, Axes::Own(&[("triangle", 0), ("corner", 3)]), Unit::Of("1")),
     of(InnerNodes, "inner_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")),
     of(Tetrahedra, "tetrahedra", Dtype::U32, Axes::Own(&[("tetrahedron", 0), ("corner", 4)]), Unit::Of("1")),
+    of(MidNodes, "mid_nodes", Dtype::U32, Axes::Own(&[("tetrahedron", 0), ("edge", 6)]), Unit::Of("1")),
     of(Regions, "regions", Dtype::U32, Axes::Own(&[("tetrahedron", 0)]), Unit::Of("1")),
 ];
 
@@ -193,7 +195,9 @@ impl Dataset {
             Iterations => self.iterations.as_deref().map(bytemuck::cast_slice),
             ContactOffsets | ContactNodes | ContactForces => self.contacts.as_ref()?.stored(array),
             TouchOffsets | TouchNodes | TouchForces => self.touches.as_ref()?.stored(array),
-            SurfaceNodes | SurfaceTriangles | InnerNodes | Tetrahedra | Regions => self.surface.as_ref()?.stored(array),
+            SurfaceNodes | SurfaceTriangles | InnerNodes | Tetrahedra | MidNodes | Regions => {
+                self.surface.as_ref()?.stored(array)
+            }
         }
     }
 
@@ -226,6 +230,9 @@ impl Surface {
             SurfaceTriangles => Some(bytemuck::cast_slice(&self.triangles)),
             InnerNodes => solid.map(|Solid { inner_nodes, .. }| bytemuck::cast_slice(inner_nodes)),
             Tetrahedra => solid.map(|Solid { tetrahedra, .. }| bytemuck::cast_slice(tetrahedra)),
+            MidNodes => {
+                solid.filter(|solid| !solid.mid_nodes.is_empty()).map(|solid| bytemuck::cast_slice(&solid.mid_nodes))
+            }
             Regions => {
                 solid.filter(|solid| !solid.regions.is_empty()).map(|solid| bytemuck::cast_slice(&solid.regions))
             }

@@ -19,6 +19,7 @@ impl Surface {
             solid: (!object.tetrahedra.is_empty()).then(|| Solid {
                 inner_nodes: numbers(inner),
                 tetrahedra: object.tetrahedra.as_flattened().to_vec().into(),
+                mid_nodes: object.mid_nodes.as_flattened().to_vec().into(),
                 regions: object.regions.clone().into(),
             }),
         }
@@ -29,18 +30,18 @@ impl Surface {
     /// # Errors
     /// As for [`Object::from_body`].
     pub fn object(&self, spec: &ObjectSpec) -> Result<Object, ObjectError> {
-        let (inner, tetrahedra, regions) = self.solid.as_ref().map_or((&[][..], &[][..], &[][..]), |solid| {
-            (&solid.inner_nodes[..], &solid.tetrahedra[..], &solid.regions[..])
-        });
-        let nodes: Vec<DVec3> =
-            self.nodes.chunks_exact(3).chain(inner.chunks_exact(3)).map(DVec3::from_slice).collect();
-        let body = Body {
-            nodes,
+        let mut body = Body {
+            nodes: self.nodes.chunks_exact(3).map(DVec3::from_slice).collect(),
             surface_nodes: self.nodes.len() / 3,
             triangles: self.triangles.as_chunks().0.to_vec(),
-            tetrahedra: tetrahedra.as_chunks().0.to_vec(),
-            regions: regions.to_vec(),
+            ..Body::default()
         };
+        if let Some(Solid { inner_nodes, tetrahedra, mid_nodes, regions }) = &self.solid {
+            body.nodes.extend(inner_nodes.chunks_exact(3).map(DVec3::from_slice));
+            body.tetrahedra = tetrahedra.as_chunks().0.to_vec();
+            body.mid_nodes = mid_nodes.as_chunks().0.to_vec();
+            body.regions = regions.to_vec();
+        }
         Object::from_body(spec, body)
     }
 }

@@ -15,7 +15,7 @@ use super::{
     layout::FrameParameters, shaders,
 };
 use crate::memory::{self, Shortage};
-use crate::object::{Compliance, Factor, FactorError, Object, Stiffening, Stiffness, settled};
+use crate::object::{Attachment, Compliance, Factor, FactorError, Object, Stiffening, Stiffness, settled};
 use crate::scene::GraphicsEffects;
 use glam::DVec3;
 use std::sync::Arc;
@@ -47,7 +47,7 @@ impl FrameMethod {
     /// Chooses the method for `object`.
     #[must_use]
     pub fn suitable(object: &Object) -> Self {
-        let order = if object.stiffness.is_isotropic() { object.rest.len() } else { 3 * object.rest.len() };
+        let order = if object.stiffness.is_isotropic() { object.moved.len() } else { 3 * object.moved.len() };
         if order.saturating_pow(2) <= Self::MOST_BYTES_INVERTED / size_of::<f32>() {
             Self::Inverse
         } else {
@@ -98,15 +98,19 @@ impl FramePass {
 /// The nodes' state on the device, and the stages that advance it.
 pub struct FrameUpdate {
     context: Arc<Context>,
-    nodes: usize,
     state: StorageBuffer,
+    /// N, and displacements of the object's nodes where these are not those of K.
+    attachment: Attachment,
+    followers: Option<StorageBuffer>,
     forces: StorageBuffer,
-    /// Forces, weight and what stiffening adds; absent without such effects.
+    /// Forces on the nodes of K, weight and what stiffening adds; absent where they are `forces`.
     loads: Option<StorageBuffer>,
     /// M g of each node (N); none without gravity.
     weight: Vec<DVec3>,
-    /// The forces as the shader reads them.
-    padded_forces: Vec<[f32; 4]>,
+    /// Forces on the nodes of K (N).
+    acting: Vec<DVec3>,
+    /// Forces as the shader reads them.
+    padded: Vec<[f32; 4]>,
     stages: Vec<FramePass>,
     takes: FrameCost,
 }
@@ -196,10 +200,18 @@ impl FrameUpdate {
                 stages.extend(common.iterative_stages(gpu, &odd, [&work, &sums], iterations, &overrides)?);
             }
         }
+        let attachment = object.attachment.clone();
+        let followers = if attachment.is_identity() {
+            None
+        } else {
+            let (stage, followers) = following_stage(gpu, &attachment, &common.state, &mut buffers)?;
+            stages.push(stage);
+            Some(followers)
+        };
         let takes = FrameCost::of(&buffers, &stages);
-        let nodes = object.rest.len();
+        let (acting, padded) = (vec![DVec3::ZERO; object.moved.len()], Vec::new());
         let Common { state, forces, loads, .. } = common;
-        Ok(Self { nodes, state, forces, loads, weight, padded_forces: vec![[0.0; 4]; nodes], stages, takes, context })
+        Ok(Self { state, attachment, followers, forces, loads, weight, acting, padded, stages, takes, context })
     }
 
     /// Returns the resources of the update on the device.
@@ -208,23 +220,23 @@ impl FrameUpdate {
         self.takes
     }
 
-    /// Advances by one frame under `forces`, one per node (N); missing ones count as zero. Does not wait for the
-    /// device.
+    /// Advances by one frame under `forces`, one per node of the object (N); missing ones count as zero. Does not wait
+    /// for the device.
     ///
     /// # Errors
     /// When the device has failed.
     pub fn step(&mut self, forces: &[DVec3]) -> Result<(), GpuError> {
-        self.padded_forces.fill([0.0; 4]);
-        for (padded, force) in self.padded_forces.iter_mut().zip(forces) {
-            *padded = force.as_vec3().extend(0.0).to_array();
-        }
-        self.forces.write(&self.context, &self.padded_forces);
+        let padded = |force: DVec3| force.as_vec3().extend(0.0).to_array();
+        self.padded.clear();
+        self.padded.extend(forces.iter().map(|force| padded(*force)));
+        self.padded.resize(self.attachment.rows(), [0.0; 4]);
+        self.forces.write(&self.context, &self.padded);
         if let Some(loads) = &self.loads {
-            for (node, (padded, weight)) in self.padded_forces.iter_mut().zip(&self.weight).enumerate() {
-                let force = forces.get(node).copied().unwrap_or(DVec3::ZERO);
-                *padded = (force + *weight).as_vec3().extend(0.0).to_array();
-            }
-            loads.write(&self.context, &self.padded_forces);
+            self.attachment.spread(forces, &mut self.acting);
+            self.acting.iter_mut().zip(&self.weight).for_each(|(force, weight)| *force += *weight);
+            self.padded.clear();
+            self.padded.extend(self.acting.iter().map(|force| padded(*force)));
+            loads.write(&self.context, &self.padded);
         }
         let mut encoder = self.context.device.create_command_encoder(&Default::default());
         self.context.record(&mut encoder, self.stages.iter().map(FramePass::dispatch));
@@ -232,8 +244,8 @@ impl FrameUpdate {
         self.context.check()
     }
 
-    /// Displacements u = n - n0 (m) and velocities (m/s) of all nodes; of quasi-static graphics no velocities. Waits
-    /// for the device.
+    /// Displacements u = n - n0 (m) and velocities (m/s) of all nodes of K; of quasi-static graphics no velocities.
+    /// Waits for the device.
     ///
     /// # Errors
     /// When the device has failed.
@@ -241,14 +253,25 @@ impl FrameUpdate {
         let state: Vec<[f32; 4]> = self.state.read(&self.context, self.state.size() as usize / 16)?;
         let mut vectors: Vec<DVec3> =
             state.iter().map(|&[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())).collect();
-        let velocities = vectors.split_off(self.nodes);
+        let velocities = vectors.split_off(self.attachment.columns());
         Ok((vectors, velocities))
     }
 
-    /// Displacements, then velocities where there are any, four numbers a node: what a viewer binds to draw the object.
+    /// Displacements of the object's own nodes (m), as they are drawn. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device has failed.
+    pub fn drawn(&self) -> Result<Vec<DVec3>, GpuError> {
+        let drawn = self.followers.as_ref().unwrap_or(&self.state);
+        let drawn: Vec<[f32; 4]> = drawn.read(&self.context, self.attachment.rows())?;
+        Ok(drawn.iter().map(|&[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())).collect())
+    }
+
+    /// Displacements of the object's nodes, maybe velocities after them, four numbers a node: what a viewer binds to draw
+    /// the object.
     #[must_use]
     pub fn state_buffer(&self) -> &wgpu::Buffer {
-        &self.state.raw
+        &self.followers.as_ref().unwrap_or(&self.state).raw
     }
 
     /// Contact forces of the last frame, four numbers a node (N).
@@ -256,6 +279,39 @@ impl FrameUpdate {
     pub fn force_buffer(&self) -> &wgpu::Buffer {
         &self.forces.raw
     }
+}
+
+/// The stage by which the object's nodes follow `state`, and their displacements; `buffers` takes the sizes of all that
+/// it needs (B).
+fn following_stage(
+    gpu: &Context,
+    attachment: &Attachment,
+    state: &StorageBuffer,
+    buffers: &mut Vec<u64>,
+) -> Result<(FramePass, StorageBuffer), GpuError> {
+    let nodes = attachment.rows();
+    let entries = (0..nodes).flat_map(|node| attachment.row(node));
+    let (columns, weights): (Vec<u32>, Vec<f32>) = entries.map(|&(column, weight)| (column, weight as f32)).unzip();
+    let ends = (0..nodes).scan(0, |end, node| {
+        *end += attachment.row(node).len() as u32;
+        Some(*end)
+    });
+    let rows: Vec<u32> = std::iter::once(0).chain(ends).chain(columns).collect();
+    let rows = StorageBuffer::from_slice(gpu, "rows of the attachment", &rows)?;
+    let weights = StorageBuffer::from_slice(gpu, "weights of the attachment", &weights)?;
+    let followers = StorageBuffer::from_slice(gpu, "followers", &vec![[0.0f32; 4]; nodes])?;
+    let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_SURFACE, &[])?);
+    let named = [("rows", &rows), ("weights", &weights), ("state", state), ("followers", &followers)];
+    let bound = kernel.bind(gpu, &named)?;
+    let sizes = [rows.size(), weights.size(), followers.size()];
+    buffers.extend(sizes);
+    let pass = FramePass {
+        kernel,
+        bound,
+        workgroups: (nodes as u32).div_ceil(WORKGROUP),
+        bytes: sizes.iter().sum::<u64>() + state.size(),
+    };
+    Ok((pass, followers))
 }
 
 /// State at the start: displacements under the nodes' `weight` (m), then velocities where there are any; four numbers a
@@ -266,7 +322,7 @@ fn start(
     stiffening: Option<&Stiffening>,
     effects: &GraphicsEffects,
 ) -> Result<Vec<[f32; 4]>, FactorError> {
-    let nodes = object.rest.len();
+    let nodes = object.moved.len();
     let mut start = vec![[0.0; 4]; if effects.quasi_static { nodes } else { 2 * nodes }];
     if !weight.is_empty() {
         for (start, u) in start.iter_mut().zip(settled(object, weight, stiffening)?) {
@@ -285,7 +341,7 @@ fn inverse(
     period: f64,
     effects: &GraphicsEffects,
 ) -> Result<(Vec<f32>, bool), FrameError> {
-    let nodes = object.rest.len();
+    let nodes = object.moved.len();
     let inertia = object.mass.iter().zip(&object.damping);
     let mut diagonal: Vec<f64> = inertia.map(|(mass, damping)| 2.0 * mass / period + damping).collect();
     if effects.quasi_static {
@@ -334,9 +390,9 @@ impl Common {
         start: &[[f32; 4]],
         is_heavy: bool,
     ) -> Result<Self, GpuError> {
-        let nodes = object.rest.len();
-        let zero = vec![[0.0f32; 4]; nodes];
-        let has_loads = is_heavy || effects.stiffening.is_some();
+        let nodes = object.moved.len();
+        let zero = vec![[0.0f32; 4]; nodes.max(object.rest.len())];
+        let has_loads = is_heavy || effects.stiffening.is_some() || !object.attachment.is_identity();
         let mut structure: Vec<u32> = stiffness.offsets.iter().map(|&offset| offset as u32).collect();
         structure.extend(&stiffness.columns);
         let blocks: Vec<f32> =
@@ -353,8 +409,8 @@ impl Common {
             inertia: (!effects.quasi_static)
                 .then(|| StorageBuffer::from_slice(gpu, "masses and damping", &inertia))
                 .transpose()?,
-            forces: StorageBuffer::from_slice(gpu, "frame forces", &zero)?,
-            loads: has_loads.then(|| StorageBuffer::from_slice(gpu, "frame loads", &zero)).transpose()?,
+            forces: StorageBuffer::from_slice(gpu, "frame forces", &zero[..object.rest.len()])?,
+            loads: has_loads.then(|| StorageBuffer::from_slice(gpu, "frame loads", &zero[..nodes])).transpose()?,
             state: StorageBuffer::from_slice(gpu, "frame state", start)?,
         })
     }

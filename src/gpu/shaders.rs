@@ -100,6 +100,10 @@ pub static FRAME_STIFFENING: Shader = stage(
     &[&[("FACTOR", 8.0), ("STRAIN", 0.1)]],
 );
 
+/// Frame update: nodes that follow those of K.
+pub static FRAME_SURFACE: Shader =
+    stage("frame_surface", "main", &[include_str!("../../shaders/frame_surface.wgsl")], &[&[]]);
+
 /// Frame update by the inverse: right-hand side.
 pub static FRAME_LOAD: Shader = stage("frame", "load", &[FRAME_COMMON, FRAME], INVERSES);
 
@@ -125,6 +129,7 @@ pub static FRAME_FINISH: Shader = stage("frame_iterative", "finish", &[FRAME_COM
 pub static ALL: &[Shader] = &[
     REST,
     FRAME_STIFFENING,
+    FRAME_SURFACE,
     FRAME_LOAD,
     FRAME_ADVANCE,
     FRAME_BEGIN,

@@ -14,6 +14,9 @@ pub struct Body {
     pub triangles: Vec<[u32; 3]>,
     /// Corners of tetrahedra of positive volume; empty for a surface.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Nodes in the middles of each tetrahedron's edges 01, 12, 02, 03, 23 and 13 (Gmsh's order), those of the surface
+    /// being surface nodes; empty if the edges are straight and have none.
+    pub mid_nodes: Vec<[u32; 6]>,
     /// Physical volume of each tetrahedron, 0 outside all; empty if the mesh names none.
     pub regions: Vec<u32>,
 }
@@ -29,6 +32,10 @@ impl Body {
     pub(super) fn check(&self) -> Result<(), ObjectError> {
         let count = self.nodes.len();
         let wild = |corners: &&[u32; 4]| corners.iter().any(|&corner| corner as usize >= count);
+        let is_wild = self.mid_nodes.as_flattened().iter().any(|&node| node as usize >= count);
+        if is_wild || !self.mid_nodes.is_empty() && self.mid_nodes.len() != self.tetrahedra.len() {
+            return Err(ObjectError::MidNodes { tetrahedra: self.tetrahedra.len(), count });
+        }
         if !self.regions.is_empty() && self.regions.len() != self.tetrahedra.len() {
             return Err(ObjectError::Regions { regions: self.regions.len(), tetrahedra: self.tetrahedra.len() });
         }

@@ -1,13 +1,13 @@
-//! The compliance C = K^-1 on surface nodes.
+//! The compliance C = N K^-1 N^T on surface nodes, N being how these follow the nodes of K.
 //!
-//! Contact acts on surface nodes only, and only on those that the proxy can reach, so the rows and columns of K^-1 at
+//! Contact acts on surface nodes only, and only on those that the proxy can reach, so the rows and columns of C at
 //! these nodes are all that it needs: leaving out the others is exact static condensation, not an approximation. K is
 //! fixed per object: one factorisation, then one solve a column, in blocks of columns on all cores.
 //!
 //! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of
 //! nodes is all there is to store and to multiply with, instead of nine.
 
-use super::{Factor, Object, ObjectError};
+use super::{Attachment, Factor, Object, ObjectError};
 use crate::memory;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -42,7 +42,7 @@ impl Compliance {
     #[must_use]
     pub fn new(object: &Object) -> Self {
         let nodes = (0..object.surface_nodes as u32).collect();
-        Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes)
+        Self::of(&object.factor, &object.attachment, object.surface_nodes, nodes)
     }
 
     /// The compliance on some surface nodes of `object`, ascending and each once.
@@ -51,7 +51,7 @@ impl Compliance {
     /// When it would not fit in memory; nothing has been allocated then.
     pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, ObjectError> {
         Self::check(object, nodes.len())?;
-        Ok(Self::of(&object.factor, object.rest.len(), object.surface_nodes, nodes))
+        Ok(Self::of(&object.factor, &object.attachment, object.surface_nodes, nodes))
     }
 
     /// Checks that the compliance on `nodes` surface nodes of `object` would fit in memory.
@@ -74,28 +74,32 @@ impl Compliance {
     /// The whole inverse of the matrix that `factor` factorises, over `nodes` nodes, surface and inner ones.
     #[must_use]
     pub fn inverse(factor: &Factor, nodes: usize) -> Self {
-        Self::of(factor, nodes, nodes, (0..nodes as u32).collect())
+        Self::of(factor, &Attachment::identity(nodes), nodes, (0..nodes as u32).collect())
     }
 
-    /// The part of K^-1 at `covered` ones of the first `surface_nodes` of `nodes` nodes.
-    fn of(factor: &Factor, nodes: usize, surface_nodes: usize, covered: Vec<u32>) -> Self {
+    /// The part of N K^-1 N^T at `covered` ones of the first `surface_nodes` nodes; N is `attachment`.
+    fn of(factor: &Factor, attachment: &Attachment, surface_nodes: usize, covered: Vec<u32>) -> Self {
         let rows_per_node = factor.rows_per_node();
         let order = rows_per_node * covered.len();
         let mut places = vec![ABSENT; surface_nodes];
         covered.iter().zip(0..).for_each(|(&node, place)| places[node as usize] = place);
-        let row_of = |k: usize| rows_per_node * covered[k / rows_per_node] as usize + k % rows_per_node;
+        // Row k of N, one for each coordinate of a node.
+        let row = |k: usize| {
+            let nodes = attachment.row(covered[k / rows_per_node] as usize).iter();
+            nodes.map(move |&(node, weight)| (rows_per_node * node as usize + k % rows_per_node, weight))
+        };
         let mut entries = vec![0.0; order * order];
         entries.par_chunks_mut((COLUMNS_PER_SOLVE * order).max(1)).enumerate().for_each(|(chunk, rows)| {
             let width = rows.len() / order;
             let first = chunk * COLUMNS_PER_SOLVE;
-            let mut columns = faer::Mat::zeros(rows_per_node * nodes, width);
+            let mut columns = faer::Mat::zeros(rows_per_node * attachment.columns(), width);
             for k in 0..width {
-                columns[(row_of(first + k), k)] = 1.0;
+                row(first + k).for_each(|(at, weight)| columns[(at, k)] = weight);
             }
             factor.solve_rows(columns.as_mut());
-            for (k, row) in rows.chunks_exact_mut(order).enumerate() {
-                for (i, entry) in row.iter_mut().enumerate() {
-                    *entry = columns[(row_of(i), k)];
+            for (k, entries) in rows.chunks_exact_mut(order).enumerate() {
+                for (i, entry) in entries.iter_mut().enumerate() {
+                    *entry = row(i).map(|(at, weight)| weight * columns[(at, k)]).sum();
                 }
             }
         });
@@ -175,7 +179,7 @@ mod tests {
     fn condensation_leaves_interior_nodes_without_force() {
         let stiffness = stiffness();
         let factor = Factor::of(&stiffness, 1.0, &[0.0; 6]).unwrap();
-        let compliance = Compliance::of(&factor, 6, 4, vec![0, 1, 2, 3]);
+        let compliance = Compliance::of(&factor, &Attachment::identity(6), 4, vec![0, 1, 2, 3]);
         assert_eq!((compliance.order(), compliance.entries.len()), (12, 144));
         // The displacement that the whole object takes under a force on node 2 is, on the surface, C's column; and its
         // forces vanish everywhere else, interior nodes included.
@@ -194,8 +198,8 @@ mod tests {
     #[test]
     fn covering_fewer_nodes_changes_no_entry() {
         let factor = Factor::of(&stiffness(), 1.0, &[0.0; 6]).unwrap();
-        let whole = Compliance::of(&factor, 6, 4, vec![0, 1, 2, 3]);
-        let some = Compliance::of(&factor, 6, 4, vec![1, 3]);
+        let whole = Compliance::of(&factor, &Attachment::identity(6), 4, vec![0, 1, 2, 3]);
+        let some = Compliance::of(&factor, &Attachment::identity(6), 4, vec![1, 3]);
         assert!(whole.is_whole() && !some.is_whole());
         assert_eq!([0, 1, 2, 3, 9].map(|node| some.place(node)), [None, Some(0), None, Some(1), None]);
         for (i, a) in [1, 3].into_iter().enumerate() {

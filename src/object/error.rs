@@ -88,6 +88,17 @@ pub enum ObjectError {
         /// Number of nodes.
         count: usize,
     },
+    /// Nodes in the middles of edges that are not there, or for another number of tetrahedra.
+    #[error(
+        "the nodes in the middles of edges do not fit {tetrahedra} tetrahedra and {count} nodes: build the object \
+         again from its scene"
+    )]
+    MidNodes {
+        /// Number of tetrahedra.
+        tetrahedra: usize,
+        /// Number of nodes.
+        count: usize,
+    },
     /// More surface nodes than nodes.
     #[error("{surface} of {count} nodes are on the surface: build the object again from its scene")]
     SurfaceNodes {
@@ -117,12 +128,12 @@ pub enum ObjectError {
         /// Cubes that are taken.
         limit: f64,
     },
-    /// A surface has no tetrahedra to be elastic with.
-    #[error("an elastic {surface} is filled with a lattice: give its size as object.elasticity.cell")]
-    NoCell {
-        /// The mesh file, or `sphere`.
-        surface: String,
-    },
+    /// A ground for which the object has no material.
+    #[error("a ground per volume, or one that clamps, needs an elastic solid: give a stiffness per node or per area")]
+    GroundWithoutSolid,
+    /// Springs along tetrahedra with nodes in the middles of their edges.
+    #[error("springs run along tetrahedra of four nodes: save the mesh in first order (gmsh -order 1)")]
+    CurvedSprings,
     /// An inclusion holds no part of the solid.
     #[error("no part of the solid is in the inclusion ({inclusion}): correct its place, or remove it")]
     EmptyInclusion {

@@ -26,11 +26,12 @@ use faer::{Conj, Mat, MatMut, Par, Side};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Smallest accepted reciprocal condition number of K (1). K (C f) equals f to about machine precision over this
-/// number, and the equilibria that are stored promise 1e-6.
+/// Smallest accepted reciprocal condition number of K with its diagonal scaled to one (1): what is soft for its place
+/// alone, such as a cube that the surface hardly enters, costs no digits (van der Sluis 1969). K (C f) equals f to about
+/// machine precision over this number, and the equilibria that are stored promise 1e-6.
 const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
 
-/// Shift, relative to the norm of K, under which the free motion of a singular K is sought (1): the square root of
+/// Shift, relative to the diagonal of K, under which the free motion of a singular K is sought (1): the square root of
 /// machine precision is far above the rounding of a factorisation and far below the stiffness of any spring that
 /// counts.
 const MECHANISM_SHIFT: f64 = 1.5e-8;
@@ -205,21 +206,25 @@ fn lower_half(stiffness: &Stiffness, alpha: f64, diagonal: &[f64], rows_per_node
 
 /// The factor of K, or the reason why K is not positive definite to working precision.
 pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, ObjectError> {
-    let nodes = stiffness.nodes();
-    let norm = stiffness.norm();
-    match Factor::of(stiffness, 1.0, &vec![0.0; nodes]) {
+    let mut diagonal = stiffness.diagonal();
+    let largest = diagonal.iter().copied().fold(0.0, f64::max);
+    // A node without any spring.
+    diagonal.iter_mut().for_each(|own| *own = own.max(f64::EPSILON * largest));
+    let roots: Vec<f64> = diagonal.iter().map(|own| own.sqrt()).collect();
+    let norm = stiffness.scaled_norm(&roots.iter().map(|root| root.recip()).collect::<Vec<_>>());
+    match Factor::of(stiffness, 1.0, &vec![0.0; diagonal.len()]) {
         Ok(factor) => {
-            let (smallest, softest) = softest_mode(&factor, nodes);
+            let (smallest, softest) = softest_mode(&factor, &roots);
             if smallest < MIN_RECIPROCAL_CONDITION * norm {
                 return Err(mechanism(&softest, smallest / norm));
             }
             Ok(factor)
         }
         Err(FactorError::NotPositiveDefinite) => {
-            let shift = MECHANISM_SHIFT * norm;
-            let shifted = Factor::of(stiffness, 1.0, &vec![shift; nodes])?;
-            let (smallest, softest) = softest_mode(&shifted, nodes);
-            Err(mechanism(&softest, (smallest - shift).max(0.0) / norm))
+            let shifts: Vec<f64> = diagonal.iter().map(|own| MECHANISM_SHIFT * own).collect();
+            let shifted = Factor::of(stiffness, 1.0, &shifts)?;
+            let (smallest, softest) = softest_mode(&shifted, &roots);
+            Err(mechanism(&softest, (smallest - MECHANISM_SHIFT).max(0.0) / norm))
         }
         Err(error) => Err(error.into()),
     }
@@ -229,15 +234,19 @@ pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, O
 /// mechanism's is below 1e-8, so that three are plenty.
 const INVERSE_ITERATIONS: usize = 3;
 
-/// An upper bound on the smallest eigenvalue, close to it where one is far below the rest, and its mode.
-fn softest_mode(factor: &Factor, nodes: usize) -> (f64, Vec<DVec3>) {
+/// An upper bound on the smallest eigenvalue of D^-1/2 K D^-1/2, close to it where one is far below the rest, and the
+/// displacements of its mode. `roots`: D^1/2, one number a node.
+fn softest_mode(factor: &Factor, roots: &[f64]) -> (f64, Vec<DVec3>) {
     // A start without symmetry, so that it is not orthogonal to a symmetric mode.
     let wave = |k: usize| (1.0 + 0.7 * k as f64 + 0.01 * (k * k % 97) as f64).sin();
-    let mut mode: Vec<DVec3> = (0..nodes).map(|i| DVec3::new(wave(3 * i), wave(3 * i + 1), wave(3 * i + 2))).collect();
+    let mut mode: Vec<DVec3> =
+        (0..roots.len()).map(|i| DVec3::new(wave(3 * i), wave(3 * i + 1), wave(3 * i + 2))).collect();
     let mut eigenvalue = f64::INFINITY;
     for _ in 0..INVERSE_ITERATIONS {
         let before = norm(&mode);
+        mode.iter_mut().zip(roots).for_each(|(v, root)| *v *= *root);
         factor.solve(&mut mode);
+        mode.iter_mut().zip(roots).for_each(|(v, root)| *v *= *root);
         let after = norm(&mode);
         if !(after > 0.0 && after.is_finite()) {
             return (0.0, mode);
@@ -245,6 +254,7 @@ fn softest_mode(factor: &Factor, nodes: usize) -> (f64, Vec<DVec3>) {
         eigenvalue = before / after;
         mode.iter_mut().for_each(|v| *v /= after);
     }
+    mode.iter_mut().zip(roots).for_each(|(v, root)| *v /= *root);
     (eigenvalue, mode)
 }
 

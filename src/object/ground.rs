@@ -1,8 +1,29 @@
-//! Which nodes the ground springs Kg hold, and whether they hold every part of the object.
+//! What holds the object: springs Kg, per node, per area or per volume, or a clamp.
+//!
+//! Springs per node depend on the mesh: a finer one has more of them. Those per area and per volume belong to the body.
+//! A clamp is springs per area so stiff that they hardly give way. All act on the displacement of the surface, or of the
+//! solid, as the nodes of K move it.
 
-use super::ObjectError;
-use crate::scene::{GroundNodes, GroundSpec};
-use glam::DVec3;
+use super::attachment::{Attachment, SurfacePoint};
+use super::solid::Elements;
+use super::{ObjectError, Stiffness};
+use crate::scene::{GroundNodes, GroundSpec, GroundStiffness};
+use glam::{DMat3, DVec3};
+use std::collections::BTreeMap;
+
+/// Stiffness of a clamp per area, in Young's moduli over the mean edge of the surface (1). Under the stress that
+/// strains the solid by one percent the clamped surface moves by a millionth of an edge. Larger: K is worse conditioned.
+const CLAMP: f64 = 1e4;
+
+/// What the ground acts on.
+pub(super) struct Held<'a> {
+    pub points: &'a [SurfacePoint],
+    pub attachment: &'a Attachment,
+    /// The elements of a solid, and its Young's modulus (Pa).
+    pub solid: Option<(&'a dyn Elements, f64)>,
+    /// Mean edge of the surface (m).
+    pub edge: f64,
+}
 
 /// Per node: is it grounded?
 pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, ObjectError> {
@@ -23,6 +44,70 @@ pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, 
                 return Err(ObjectError::NothingBelow { height: *height, lowest });
             }
             Ok(grounded)
+        }
+    }
+}
+
+impl Held<'_> {
+    /// Adds Kg to `stiffness`, whose pattern holds the nodes of each element and of each grounded row of N. `grounded`:
+    /// see [`select`].
+    pub fn add(&self, ground: &GroundSpec, grounded: &[bool], stiffness: &mut Stiffness) {
+        match ground.stiffness {
+            GroundStiffness::PerNode(k) => {
+                for node in (0..grounded.len()).filter(|&node| grounded[node]) {
+                    let row = self.attachment.row(node);
+                    stiffness.add_products(row, row, k);
+                }
+            }
+            GroundStiffness::PerArea(k) => self.add_area(ground, grounded, k, stiffness),
+            GroundStiffness::Clamp => {
+                let young = self.solid.map_or(0.0, |(_, young)| young);
+                self.add_area(ground, grounded, CLAMP * young / self.edge, stiffness);
+            }
+            GroundStiffness::PerVolume(k) => {
+                let Some((elements, _)) = self.solid else { return };
+                let height = match ground.nodes {
+                    GroundNodes::Below(height) => height,
+                    _ => f64::INFINITY,
+                };
+                for element in 0..elements.count() {
+                    let products = elements.below(element, height).products();
+                    add_element(elements.nodes(element), &products, k, stiffness);
+                }
+            }
+        }
+    }
+
+    /// Adds springs of `k` per area (N/m^3).
+    fn add_area(&self, ground: &GroundSpec, grounded: &[bool], k: f64, stiffness: &mut Stiffness) {
+        let is_held = |point: &&SurfacePoint| match ground.nodes {
+            GroundNodes::Below(height) => point.place.z < height,
+            _ => grounded[point.owner as usize],
+        };
+        let held = self.points.iter().filter(is_held);
+        let Some((elements, _)) = self.solid else {
+            return held.for_each(|point| {
+                let row = self.attachment.row(point.owner as usize);
+                stiffness.add_products(row, row, k * point.area);
+            });
+        };
+        let mut products: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+        for point in held {
+            let (element, values) = elements.locate(point);
+            let products = products.entry(element).or_insert_with(|| vec![0.0; values.len() * values.len()]);
+            for (row, a) in products.chunks_exact_mut(values.len()).zip(&values) {
+                row.iter_mut().zip(&values).for_each(|(sum, b)| *sum += point.area * a * b);
+            }
+        }
+        products.iter().for_each(|(&element, products)| add_element(elements.nodes(element), products, k, stiffness));
+    }
+}
+
+/// Adds `k` times `products`, row-major, between the `nodes` of an element.
+fn add_element(nodes: &[u32], products: &[f64], k: f64, stiffness: &mut Stiffness) {
+    for (&node, row) in nodes.iter().zip(products.chunks_exact(nodes.len())) {
+        for (&other, &product) in nodes.iter().zip(row) {
+            stiffness.add(node as usize, other as usize, DMat3::from_diagonal(DVec3::splat(k * product)));
         }
     }
 }

@@ -5,17 +5,18 @@
 //! equation (2)). An object that the ground does not hold, or a surface that is not closed, is refused with the reason.
 //! The [`Compliance`] C = K^-1 is for contact alone, which forms it from the factor; graphics never does.
 
+mod attachment;
 mod body;
 mod compliance;
 mod crossing;
-mod elasticity;
+mod element;
 mod error;
 mod factor;
-mod fill;
 mod ground;
 mod icosphere;
 mod import;
 mod inclusion;
+mod lattice;
 mod ordering;
 mod refine;
 mod settled;
@@ -26,8 +27,10 @@ mod springs;
 mod stiffening;
 mod stiffness;
 mod substitution;
+mod tetrahedra;
 mod topology;
 
+pub use attachment::Attachment;
 pub use body::Body;
 pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
@@ -42,15 +45,21 @@ pub use topology::Topology;
 
 use crate::{
     memory,
-    scene::{ElasticSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape},
+    scene::{ElasticSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape},
 };
-use glam::{DMat3, DVec3};
+use glam::DVec3;
+use ground::Held;
+use inclusion::Materials;
+use lattice::Lattice;
 use skin::Laplacian;
-use solid::Solid;
+use solid::Elements;
+use tetrahedra::Tetrahedra;
 
 /// A deformable object at rest.
 ///
-/// Nodes `0..surface_nodes` lie on the surface and are the only ones that triangles name; interior nodes follow.
+/// Nodes `0..surface_nodes` lie on the surface and are the only ones that triangles name; interior nodes of a mesh of
+/// tetrahedra follow. K moves nodes of its own, those of the finite elements of an elastic solid, which the object's
+/// nodes follow by [`Attachment`]; on springs and skins the two are the same.
 #[derive(Clone, Debug)]
 pub struct Object {
     /// Rest positions n0 of all nodes (m).
@@ -61,19 +70,25 @@ pub struct Object {
     pub triangles: Vec<[u32; 3]>,
     /// Corners of the tetrahedra of a mesh of such; empty for a surface, whatever fills it.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Nodes in the middles of their edges, as in [`Body`]; empty if the edges are straight.
+    pub mid_nodes: Vec<[u32; 6]>,
     /// Physical volume of each tetrahedron; empty if the mesh names none.
     pub regions: Vec<u32>,
     /// Neighbours on the surface.
     pub topology: Topology,
     /// The skin of the surface, where it has one.
     pub skin: Option<Skin>,
-    /// K = Kn + Kg over all nodes, the skin's included (N/m).
+    /// Rest positions of the nodes of K (m).
+    pub moved: Vec<DVec3>,
+    /// N: how the object's nodes follow those of K.
+    pub attachment: Attachment,
+    /// K = Kn + Kg over its nodes, the skin's included (N/m).
     pub stiffness: Stiffness,
     /// Cholesky factor of K.
     pub factor: Factor,
-    /// Mass of each node (kg).
+    /// Mass of each node of K (kg).
     pub mass: Vec<f64>,
-    /// Damping of each node against the ground (N s/m).
+    /// Damping of each node of K against the ground (N s/m).
     pub damping: Vec<f64>,
     /// Repairs made on the way, one sentence each, for the user to read.
     pub warnings: Vec<String>,
@@ -145,61 +160,96 @@ impl Object {
         Self::assemble(spec, body, Vec::new())
     }
 
-    fn assemble(spec: &ObjectSpec, body: Body, mut warnings: Vec<String>) -> Result<Self, ObjectError> {
+    fn assemble(spec: &ObjectSpec, mut body: Body, mut warnings: Vec<String>) -> Result<Self, ObjectError> {
         check_parameters(spec)?;
         check_count(body.nodes.len())?;
-        let Body { mut nodes, surface_nodes, mut triangles, tetrahedra, regions } = body;
-        let surface = topology::close(&nodes[..surface_nodes], &mut triangles)
+        let surface = topology::close(&body.nodes[..body.surface_nodes], &mut body.triangles)
             .map_err(|defect| ObjectError::Surface { surface: surface_name(spec), defect })?;
         warnings.extend(surface.warnings);
-        let mut solid = Solid {
-            filled: vec![1.0; tetrahedra.len()],
-            tetrahedra: tetrahedra.clone(),
-            regions: regions.clone(),
-            ..Solid::default()
+        let shell = &body.nodes[..body.surface_nodes];
+        let edge = topology::mean_edge(shell, &body.triangles);
+        let mut points = Vec::new();
+        let elements: Option<Box<dyn Elements>> = match &spec.material {
+            Material::Elastic(elastic) if body.tetrahedra.is_empty() => {
+                let cell = elastic.cell.unwrap_or_else(|| lattice::suitable_size(shell, edge));
+                points = attachment::surface_points(shell, &body.triangles, lattice::POINT_SPACING * cell);
+                Some(Box::new(Lattice::fill(shell, &body.triangles, cell, &points)?))
+            }
+            Material::Elastic(_) => Some(Box::new(Tetrahedra::new(&body))),
+            _ => None,
         };
-        if let (Material::Elastic(ElasticSpec { cell, .. }), true) = (&spec.material, solid.tetrahedra.is_empty()) {
-            let cell = cell.ok_or_else(|| ObjectError::NoCell { surface: surface_name(spec) })?;
-            solid = fill::fill(&mut nodes, &triangles, cell)?;
-            check_count(nodes.len())?;
+        let is_solid = !body.tetrahedra.is_empty() || elements.is_some();
+        let elements = elements.as_deref();
+        if points.is_empty() {
+            points = attachment::surface_points(shell, &body.triangles, f64::INFINITY);
         }
-        let edges = match &spec.material {
-            Material::Hollow => Vec::new(),
-            _ if solid.tetrahedra.is_empty() => surface.edges,
-            _ => solid.edges(),
+        let (moved, attachment) = match elements {
+            Some(elements) => {
+                let moved = elements.positions().to_vec();
+                check_count(moved.len())?;
+                let rows = [body.surface_nodes, body.nodes.len() - body.surface_nodes, moved.len()];
+                let attachment = Attachment::averaged(&points, rows, |point| {
+                    let (element, values) = elements.locate(point);
+                    (elements.nodes(element), values)
+                });
+                (moved, attachment)
+            }
+            None => (body.nodes.clone(), Attachment::identity(body.nodes.len())),
         };
-        let laplacian = spec.skin.map(|skin| (skin, Laplacian::new(&nodes[..surface_nodes], &triangles)));
-        let mut pattern = edges.clone();
-        pattern.extend(laplacian.iter().flat_map(|(skin, laplacian)| laplacian.pairs(*skin)));
-        let mut stiffness = Stiffness::with_pattern(nodes.len(), &pattern);
-        stiffness.ordering = ordering::nested_dissection(&stiffness, &nodes);
+        let edges = match &spec.material {
+            Material::Springs(_) => springs::edges(&body, surface.edges)?,
+            Material::Elastic(_) | Material::Hollow => Vec::new(),
+        };
+        let laplacian = spec.skin.map(|skin| (skin, Laplacian::new(shell, &body.triangles)));
+        let grounded = spec.ground.as_ref().map(|ground| ground::select(ground, &body.nodes)).transpose()?;
+        let mut cliques: Vec<Vec<u32>> = edges.iter().map(|ends| ends.to_vec()).collect();
+        cliques.extend(elements.into_iter().flat_map(|e| (0..e.count()).map(|element| e.nodes(element).to_vec())));
+        cliques.extend(laplacian.iter().flat_map(|(skin, laplacian)| laplacian.cliques(*skin, &attachment)));
+        if spec.ground.as_ref().is_some_and(|ground| matches!(ground.stiffness, GroundStiffness::PerNode(_))) {
+            let held = grounded.iter().flatten().enumerate().filter(|(_, held)| **held);
+            cliques.extend(held.map(|(node, _)| attachment.row(node).iter().map(|(column, _)| *column).collect()));
+        }
+        let mut stiffness = Stiffness::with_pattern(moved.len(), &cliques);
+        drop(cliques);
+        stiffness.ordering = ordering::nested_dissection(&stiffness, &moved);
         let held_everywhere = spec.skin.is_some_and(|skin| skin.foundation > 0.0);
-        let grounded = spec.ground.as_ref().map(|ground| ground::select(ground, &nodes)).transpose()?;
-        if solid.tetrahedra.is_empty() && !held_everywhere {
+        if !is_solid && !held_everywhere {
             ground::check_components(&surface.components, grounded.as_deref().unwrap_or_default())?;
         }
-        for (ground, grounded) in spec.ground.iter().zip(&grounded) {
-            for (node, _) in grounded.iter().enumerate().filter(|(_, held)| **held) {
-                stiffness.add(node, node, DMat3::from_diagonal(DVec3::splat(ground.stiffness)));
+        let mut share = vec![1.0 / moved.len() as f64; moved.len()];
+        match (&spec.material, elements) {
+            (Material::Springs(springs), _) => springs::add(spec, *springs, &moved, &edges, &mut stiffness)?,
+            (Material::Elastic(elastic), Some(elements)) => {
+                share = solid::add(elements, &Materials::new(elastic), &mut stiffness)?;
             }
+            _ => {}
         }
-        match &spec.material {
-            Material::Springs(springs) => springs::add(spec, *springs, &nodes, &edges, &mut stiffness)?,
-            Material::Elastic(elastic) => solid.add(elastic, &nodes, &mut stiffness)?,
-            Material::Hollow => {}
+        let young = match &spec.material {
+            Material::Elastic(elastic) => elastic.young,
+            _ => 0.0,
+        };
+        let held =
+            Held { points: &points, attachment: &attachment, solid: elements.map(|elements| (elements, young)), edge };
+        for (ground, grounded) in spec.ground.iter().zip(&grounded) {
+            held.add(ground, grounded, &mut stiffness);
         }
-        laplacian.iter().for_each(|(skin, laplacian)| laplacian.add(*skin, &mut stiffness));
+        laplacian.iter().for_each(|(skin, laplacian)| laplacian.add(*skin, &attachment, &mut stiffness));
         let factor = factor::prove_positive_definite(&stiffness)?;
+        let total = body.nodes.len() as f64;
+        let Body { nodes, surface_nodes, triangles, tetrahedra, mid_nodes, regions } = body;
         Ok(Self {
             surface_nodes,
             skin: spec.skin.map(|skin| Skin::new(skin, &nodes[..surface_nodes], &triangles)),
-            mass: vec![spec.node_mass; nodes.len()],
-            damping: vec![spec.node_damping; nodes.len()],
+            mass: share.iter().map(|share| spec.node_mass * total * share).collect(),
+            damping: share.iter().map(|share| spec.node_damping * total * share).collect(),
             rest: nodes,
             triangles,
             tetrahedra,
+            mid_nodes,
             regions,
             topology: surface.topology,
+            moved,
+            attachment,
             stiffness,
             factor,
             warnings,
@@ -231,13 +281,19 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
         Material::Elastic(elastic) => Some(("Young's modulus", elastic.young)),
         Material::Hollow => None,
     };
-    let ground = spec.ground.as_ref().map(|ground| ("ground stiffness", ground.stiffness));
+    let ground = spec.ground.as_ref().and_then(|ground| ground.stiffness.value());
+    let ground = ground.map(|value| ("ground stiffness", value));
     let skin =
         spec.skin.map(|skin| ("skin's greatest coefficient", skin.tension.max(skin.bending).max(skin.foundation)));
     for (name, value) in material.into_iter().chain(ground).chain(skin).chain([("node mass", spec.node_mass)]) {
         if !(value > 0.0 && value.is_finite()) {
             return Err(ObjectError::Parameter { name, value, range: "positive and finite" });
         }
+    }
+    let needs_solid = |stiffness| matches!(stiffness, GroundStiffness::Clamp | GroundStiffness::PerVolume(_));
+    let is_elastic = matches!(spec.material, Material::Elastic(_));
+    if spec.ground.as_ref().is_some_and(|ground| needs_solid(ground.stiffness)) && !is_elastic {
+        return Err(ObjectError::GroundWithoutSolid);
     }
     let skin = spec.skin.map_or([0.0; 3], |skin| [skin.tension, skin.bending, skin.foundation]);
     let names = ["tension of the skin", "bending stiffness of the skin", "foundation of the skin"];

@@ -71,7 +71,7 @@ mod tests {
         let mut ordered = nested_dissection(&stiffness, &positions);
         ordered.sort_unstable();
         assert!(ordered.into_iter().eq(0..343));
-        assert!(nested_dissection(&Stiffness::with_pattern(0, &[]), &[]).is_empty());
+        assert!(nested_dissection(&Stiffness::with_pattern::<[u32; 2]>(0, &[]), &[]).is_empty());
     }
 
     /// Fill of an elimination in the order given: entries of the factor, counted on the graph.

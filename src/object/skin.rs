@@ -8,9 +8,9 @@
 //! T, b and k belong to the body, not to the mesh: a finer mesh is the same body. Under a point force the displacement
 //! stays finite only because of b. Without it the dent is a cusp that deepens as the mesh is refined.
 
-use super::{Stiffness, topology::mean_edge};
+use super::{Stiffness, attachment::Attachment, topology::mean_edge};
 use crate::scene::SkinSpec;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use serde::Serialize;
 use std::fmt;
 
@@ -98,34 +98,44 @@ impl Laplacian {
         Self { rows, areas }
     }
 
-    /// Returns the pairs of nodes that `skin` makes act on each other: neighbours, and where it resists bending
-    /// neighbours of one node as well. Each pair once.
-    pub fn pairs(&self, skin: SkinSpec) -> Vec<[u32; 2]> {
-        let mut pairs = Vec::new();
-        for (node, row) in self.rows.iter().enumerate() {
-            for (k, &(a, _)) in row.iter().enumerate() {
-                let others = row[k + 1..].iter().map(|&(b, _)| [a, b]);
-                pairs.extend(others.filter(|pair| skin.bending > 0.0 || pair.contains(&(node as u32))));
-            }
-        }
-        pairs.sort_unstable();
-        pairs.dedup();
-        pairs
+    /// Returns the groups of nodes of K that `skin` makes act on each other: those that move a node and one of its
+    /// neighbours; where it resists bending, a node and all its neighbours.
+    pub fn cliques(&self, skin: SkinSpec, attachment: &Attachment) -> Vec<Vec<u32>> {
+        let clique = |nodes: &mut dyn Iterator<Item = u32>| {
+            let moved = nodes.flat_map(|node| attachment.row(node as usize)).map(|&(column, _)| column);
+            let mut clique: Vec<u32> = moved.collect();
+            clique.sort_unstable();
+            clique.dedup();
+            clique
+        };
+        let around = |(node, row): (u32, &Vec<(u32, f64)>)| match skin.bending > 0.0 {
+            true => vec![clique(&mut row.iter().map(|(other, _)| *other))],
+            false => row.iter().map(|(other, _)| clique(&mut [node, *other].into_iter())).collect(),
+        };
+        (0..).zip(&self.rows).flat_map(around).collect()
     }
 
-    /// Adds `T L + b L M^-1 L + k M` to `stiffness`, whose pattern holds [`Laplacian::pairs`].
-    pub fn add(&self, skin: SkinSpec, stiffness: &mut Stiffness) {
+    /// Adds `N^T (T L + b L M^-1 L + k M) N` to `stiffness`, whose pattern holds [`Laplacian::cliques`].
+    pub fn add(&self, skin: SkinSpec, attachment: &Attachment, stiffness: &mut Stiffness) {
         let SkinSpec { tension, bending, foundation } = skin;
-        let mut add = |row: u32, column: u32, value: f64| {
-            stiffness.add(row as usize, column as usize, DMat3::from_diagonal(DVec3::splat(value)));
-        };
+        let mut sums = vec![0.0; attachment.columns()];
         for (node, (row, area)) in self.rows.iter().zip(&self.areas).enumerate() {
-            add(node as u32, node as u32, foundation * area);
-            for &(a, to_a) in row {
-                add(node as u32, a, tension * to_a);
-                if bending > 0.0 {
-                    row.iter().for_each(|&(b, to_b)| add(a, b, bending / area * (to_a * to_b)));
+            // A row of L N.
+            let mut curvature: Vec<(u32, f64)> = Vec::new();
+            for &(other, value) in row {
+                for &(column, weight) in attachment.row(other as usize) {
+                    curvature.push((column, 0.0));
+                    sums[column as usize] += value * weight;
                 }
+            }
+            curvature.sort_unstable_by_key(|(column, _)| *column);
+            curvature.dedup_by_key(|(column, _)| *column);
+            curvature.iter_mut().for_each(|(column, sum)| *sum = std::mem::take(&mut sums[*column as usize]));
+            let own = attachment.row(node);
+            stiffness.add_products(own, own, foundation * area);
+            stiffness.add_products(own, &curvature, tension);
+            if bending > 0.0 {
+                stiffness.add_products(&curvature, &curvature, bending / area);
             }
         }
     }

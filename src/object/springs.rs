@@ -5,9 +5,30 @@
 //! the diagonal block. Kn and Kg are positive semidefinite by construction, so K is singular only where a rigid motion
 //! or a mechanism is left free.
 
-use super::{ObjectError, Stiffness, SurfaceDefect};
+use super::{Body, ObjectError, Stiffness, SurfaceDefect, element::TETRAHEDRON_EDGES};
 use crate::scene::{ObjectSpec, SpringKind, SpringSpec};
 use glam::{DMat3, DVec3};
+
+/// The edges along which the springs of `body` run, each once: those of its tetrahedra, or of its surface.
+///
+/// # Errors
+/// [`ObjectError::CurvedSprings`].
+pub(super) fn edges(body: &Body, surface: Vec<[u32; 2]>) -> Result<Vec<[u32; 2]>, ObjectError> {
+    if body.tetrahedra.is_empty() {
+        return Ok(surface);
+    }
+    if !body.mid_nodes.is_empty() {
+        return Err(ObjectError::CurvedSprings);
+    }
+    let ends = |corners: &[u32; 4]| {
+        let corners = *corners;
+        TETRAHEDRON_EDGES.map(|[a, b]| [corners[a].min(corners[b]), corners[a].max(corners[b])])
+    };
+    let mut edges: Vec<[u32; 2]> = body.tetrahedra.iter().flat_map(ends).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    Ok(edges)
+}
 
 /// Adds Kn to `stiffness`, whose pattern holds `edges`: each edge once, as its two ends.
 pub(super) fn add(

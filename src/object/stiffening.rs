@@ -118,14 +118,14 @@ fn stiffness(block: &DMat3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec};
+    use crate::scene::{GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SpringKind, SpringSpec};
 
     fn sphere(kind: SpringKind) -> Object {
         Object::build(&ObjectSpec {
             shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings: 4, segments: 6 },
             material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
             skin: None,
-            ground: Some(GroundSpec { stiffness: 40.0, nodes: GroundNodes::All }),
+            ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(40.0), nodes: GroundNodes::All }),
             node_mass: 1e-3,
             node_damping: 0.01,
         })

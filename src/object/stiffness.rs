@@ -16,20 +16,26 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
-    /// Zero blocks on the diagonal and at both halves of every edge. `edges`: ends in range; what is repeated counts
-    /// once.
-    pub(super) fn with_pattern(nodes: usize, edges: &[[u32; 2]]) -> Self {
-        let mut rows: Vec<Vec<u32>> = (0..nodes as u32).map(|node| vec![node]).collect();
-        for &[a, b] in edges {
-            rows[a as usize].push(b);
-            rows[b as usize].push(a);
+    /// Zero blocks on the diagonal and between all nodes of each of `cliques`, such as the ends of an edge or the nodes
+    /// of an element; these are in range.
+    pub(super) fn with_pattern<C: AsRef<[u32]>>(nodes: usize, cliques: &[C]) -> Self {
+        let mut around: Vec<Vec<u32>> = vec![Vec::new(); nodes];
+        for (clique, number) in cliques.iter().zip(0..) {
+            clique.as_ref().iter().for_each(|&node| around[node as usize].push(number));
         }
-        let mut offsets = vec![0];
-        let mut columns = Vec::with_capacity(nodes + 2 * edges.len());
-        for mut row in rows {
-            row.sort_unstable();
-            row.dedup();
-            columns.extend(row);
+        let (mut offsets, mut columns) = (vec![0], Vec::new());
+        // The row that a node has been added to last.
+        let mut added: Vec<u32> = vec![u32::MAX; nodes];
+        for (around, row) in around.iter().zip(0..) {
+            let start = columns.len();
+            let others = around.iter().flat_map(|&clique| cliques[clique as usize].as_ref());
+            for &node in std::iter::once(&row).chain(others) {
+                if added[node as usize] != row {
+                    added[node as usize] = row;
+                    columns.push(node);
+                }
+            }
+            columns[start..].sort_unstable();
             offsets.push(columns.len());
         }
         let blocks = vec![DMat3::ZERO; columns.len()];
@@ -70,6 +76,16 @@ impl Stiffness {
         }
     }
 
+    /// Adds `k` times the identity times the product of weights of nodes in `left` and of nodes in `right`, in the
+    /// pattern.
+    pub(super) fn add_products(&mut self, left: &[(u32, f64)], right: &[(u32, f64)], k: f64) {
+        for &(row, a) in left {
+            right.iter().for_each(|&(column, b)| {
+                self.add(row as usize, column as usize, DMat3::from_diagonal(DVec3::splat(k * a * b)));
+            });
+        }
+    }
+
     /// `force = K displacement`: elastic force that holds the nodes displaced by `displacement` (m), (N). Both have one
     /// entry per node.
     pub fn apply(&self, displacement: &[DVec3], force: &mut [DVec3]) {
@@ -101,8 +117,23 @@ impl Stiffness {
     /// Largest sum of absolute values in a row: a bound on the largest eigenvalue (Gershgorin) (N/m).
     #[must_use]
     pub fn norm(&self) -> f64 {
-        let row_sum = |node| self.row(node).map(|(_, block)| absolute_row_sums(block)).sum::<DVec3>().max_element();
+        self.scaled_norm(&vec![1.0; self.nodes()])
+    }
+
+    /// The same of S K S, S being the diagonal matrix of `scales`, one a node.
+    pub(super) fn scaled_norm(&self, scales: &[f64]) -> f64 {
+        let row_sum = |node: usize| {
+            let sums = self.row(node).map(|(other, block)| scales[other] * absolute_row_sums(block));
+            scales[node] * sums.sum::<DVec3>().max_element()
+        };
         (0..self.nodes()).map(row_sum).fold(0.0, f64::max)
+    }
+
+    /// Mean of the diagonal of each node's own block (N/m).
+    pub(super) fn diagonal(&self) -> Vec<f64> {
+        let own = |node: usize| self.row(node).find(|(other, _)| *other == node).map(|(_, block)| *block);
+        let trace = |block: DMat3| block.x_axis.x + block.y_axis.y + block.z_axis.z;
+        (0..self.nodes()).map(|node| own(node).map_or(0.0, trace) / 3.0).collect()
     }
 }
 

@@ -1,5 +1,7 @@
 //! The object's nodes in motion, a step a frame (section 3.2), u = n - n0.
 //!
+//! K moves its own nodes; forces on the object's nodes act through N^T, and these follow by N (see `object::Attachment`).
+//!
 //! *Dynamics.* Non-iterative passive mechanical integration with a constant time T between frames:
 //! `(2M/T + B + (T/2) K) v_hat = (2M/T) v_k - K u_k + f`, `u_{k+1} = u_k + T v_hat`, `v_{k+1} = 2 v_hat - v_k`.
 //! The matrix is constant, symmetric and positive definite: factorised once. To rounding, for any T and stiffness,
@@ -23,7 +25,7 @@ use crate::{
 use glam::DVec3;
 use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
 
-/// Displacements of all nodes, and their velocities where there are dynamics.
+/// Displacements of all nodes of K, and their velocities where there are dynamics.
 pub struct ObjectMotion<'object> {
     object: &'object Object,
     period: f64,
@@ -34,7 +36,7 @@ pub struct ObjectMotion<'object> {
     weight: Option<Vec<DVec3>>,
     /// u (m).
     displacement: Vec<DVec3>,
-    /// Right-hand side, then v_hat (m/s); in quasi-static graphics u.
+    /// Forces on the nodes of K, then the right-hand side, then v_hat (m/s); in quasi-static graphics u.
     right: Vec<DVec3>,
     /// Where a frame is shared out.
     threads: Option<ThreadPool>,
@@ -63,7 +65,7 @@ impl<'object> ObjectMotion<'object> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(GraphicsError::Period(period));
         }
-        let zero = vec![DVec3::ZERO; object.rest.len()];
+        let zero = vec![DVec3::ZERO; object.moved.len()];
         let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
         let dynamics = if effects.quasi_static {
             None
@@ -92,18 +94,19 @@ impl<'object> ObjectMotion<'object> {
         self.period
     }
 
-    /// Node positions n = n0 + u (m).
+    /// Positions n = n0 + N u of the object's nodes (m).
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = DVec3> {
-        self.object.rest.iter().zip(&self.displacement).map(|(rest, u)| rest + u)
+        let Object { rest, attachment, .. } = self.object;
+        rest.iter().enumerate().map(|(node, rest)| rest + attachment.follow(node, &self.displacement))
     }
 
-    /// Displacements u (m).
+    /// Displacements u of the nodes of K (m).
     #[must_use]
     pub fn displacement(&self) -> &[DVec3] {
         &self.displacement
     }
 
-    /// Velocities v (m/s); none in quasi-static graphics.
+    /// Their velocities v (m/s); none in quasi-static graphics.
     #[must_use]
     pub fn velocity(&self) -> &[DVec3] {
         self.dynamics.as_ref().map_or(&[], |dynamics| &dynamics.velocity)
@@ -142,31 +145,32 @@ impl<'object> ObjectMotion<'object> {
         vectors * size_of::<DVec3>() + factor + stiffening
     }
 
-    /// One frame under `forces`, one per node (N). Returns v_hat (m/s); in quasi-static graphics the displacements.
+    /// One frame under `forces`, one per node of the object (N). Returns v_hat of the nodes of K (m/s); in quasi-static
+    /// graphics their displacements.
     pub fn step(&mut self, forces: &[DVec3]) -> &[DVec3] {
+        self.object.attachment.spread(forces, &mut self.right);
         match self.threads.take() {
-            None => self.frame(forces, false),
+            None => self.frame(false),
             Some(threads) => {
-                threads.install(|| self.frame(forces, true));
+                threads.install(|| self.frame(true));
                 self.threads = Some(threads);
             }
         }
         &self.right
     }
 
-    fn frame(&mut self, forces: &[DVec3], shared: bool) {
+    fn frame(&mut self, shared: bool) {
         let mut right = std::mem::take(&mut self.right);
-        self.load(forces, &mut right, shared);
+        self.load(&mut right, shared);
         self.right = right;
         self.advance();
     }
 
-    /// Right-hand side (2M/T) v - grad W(u) + f; in quasi-static graphics f.
-    fn load(&self, forces: &[DVec3], right: &mut [DVec3], shared: bool) {
+    /// Adds (2M/T) v - grad W(u) and the weight to the forces in `right`; in quasi-static graphics the weight alone.
+    fn load(&self, right: &mut [DVec3], shared: bool) {
         let Self { object, dynamics, stiffening, weight, displacement, .. } = self;
         let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
         let of_node = |(node, right): (usize, &mut DVec3)| {
-            *right = forces[node];
             if let Some(Dynamics { velocity, scales, .. }) = dynamics {
                 let momentum = (2.0 * object.mass[node] / self.period) * velocity[node];
                 let held = match scales {

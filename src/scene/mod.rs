@@ -39,8 +39,8 @@ pub use haptics::{
 };
 pub use motion::{MotionSpec, Waypoint};
 pub use object::{
-    ElasticSpec, GroundNodes, GroundSpec, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape, SpringKind,
-    SpringSpec,
+    ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape,
+    SpringKind, SpringSpec,
 };
 pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};

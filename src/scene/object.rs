@@ -100,7 +100,8 @@ pub struct ElasticSpec {
     pub young: f64,
     /// Poisson's ratio nu, above -1 and below 1/2 (1).
     pub poisson: f64,
-    /// Size of the cubes of the lattice that fills a surface; none where the shape is tetrahedra (m).
+    /// Size of the cubes of the lattice that fills a surface (m). None where the shape is tetrahedra, or where the size
+    /// follows from the surface.
     pub cell: Option<f64>,
     /// Parts with another stiffness; where two overlap, the later one counts.
     pub inclusions: Vec<InclusionSpec>,
@@ -167,20 +168,44 @@ pub enum SpringKind {
 /// Ground springs Kg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundSpec {
-    /// Stiffness at each grounded node, in all directions alike (N/m).
-    pub stiffness: f64,
-    /// Which nodes it holds.
+    /// How stiff it is, in all directions alike.
+    pub stiffness: GroundStiffness,
+    /// Which part it holds.
     pub nodes: GroundNodes,
 }
 
-/// Which nodes the ground holds.
+/// Stiffness of the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GroundStiffness {
+    /// At each grounded node of the surface (N/m).
+    PerNode(f64),
+    /// Per area of the grounded surface (N/m^3).
+    PerArea(f64),
+    /// Per volume of the grounded part of a solid (N/m^4).
+    PerVolume(f64),
+    /// The grounded surface of a solid does not move.
+    Clamp,
+}
+
+impl GroundStiffness {
+    /// The number (N/m, N/m^3 or N/m^4); none of a clamp.
+    #[must_use]
+    pub fn value(self) -> Option<f64> {
+        match self {
+            Self::PerNode(value) | Self::PerArea(value) | Self::PerVolume(value) => Some(value),
+            Self::Clamp => None,
+        }
+    }
+}
+
+/// Which nodes the ground holds; per area it holds the nodes' own areas.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GroundNodes {
     /// Every node of the object.
     All,
     /// Nodes by number.
     Listed(Vec<u32>),
-    /// Nodes whose rest position lies below this height z (m).
+    /// What lies below this height z at rest: nodes, or area or volume (m).
     Below(f64),
 }
 
@@ -277,8 +302,14 @@ struct InclusionSphereTable {
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GroundTable {
-    #[serde(deserialize_with = "positive")]
-    stiffness: f64,
+    #[serde(default, deserialize_with = "positive")]
+    stiffness: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    per_area: Option<f64>,
+    #[serde(default, deserialize_with = "positive")]
+    per_volume: Option<f64>,
+    #[serde(default)]
+    clamp: bool,
     #[serde(default, deserialize_with = "grounded")]
     nodes: Option<Vec<u32>>,
     #[serde(default, deserialize_with = "finite")]
@@ -348,7 +379,7 @@ impl ObjectTable {
             }
         };
         let skin = skin.map(|skin| skin.check(checker, &material)).transpose()?;
-        let ground = ground.map(|ground| ground.check(checker)).transpose()?;
+        let ground = ground.map(|ground| ground.check(checker, &material)).transpose()?;
         if ground.is_none() && skin.is_none_or(|skin| skin.foundation == 0.0) {
             let message = "nothing holds the object: add [object.ground], or a foundation to [object.skin]";
             return Err(checker.at("object", message));
@@ -386,10 +417,6 @@ impl ElasticityTable {
     /// `is_solid`: whether the shape is the tetrahedra of a Gmsh file.
     fn check(self, checker: &Checker<'_>, is_solid: bool) -> Result<ElasticSpec, SceneError> {
         let Self { young, poisson, cell, inclusion } = self;
-        if cell.is_none() && !is_solid {
-            let message = "elasticity needs cell, the size of the lattice that fills the surface [m]";
-            return Err(checker.at("object.elasticity", message));
-        }
         if cell.is_some() && is_solid {
             return Err(checker.at("object.elasticity.cell", "tetrahedra are solid already: leave cell out"));
         }
@@ -417,7 +444,31 @@ impl ElasticityTable {
 }
 
 impl GroundTable {
-    fn check(self, checker: &Checker<'_>) -> Result<GroundSpec, SceneError> {
+    fn check(self, checker: &Checker<'_>, material: &Material) -> Result<GroundSpec, SceneError> {
+        let stiffness = match (self.stiffness, self.per_area, self.per_volume, self.clamp) {
+            (Some(k), None, None, false) => GroundStiffness::PerNode(k),
+            (None, Some(k), None, false) => GroundStiffness::PerArea(k),
+            (None, None, Some(k), false) => GroundStiffness::PerVolume(k),
+            (None, None, None, true) => GroundStiffness::Clamp,
+            _ => {
+                let message = "the ground needs one of per_area [N/m^3], per_volume [N/m^4], clamp = true, and \
+                               stiffness, of each node [N/m]";
+                return Err(checker.at("object.ground", message));
+            }
+        };
+        let key = match stiffness {
+            GroundStiffness::PerVolume(_) => "per_volume",
+            GroundStiffness::Clamp => "clamp",
+            GroundStiffness::PerNode(_) | GroundStiffness::PerArea(_) => "",
+        };
+        if !key.is_empty() && !matches!(material, Material::Elastic(_)) {
+            let message = format!("{key} needs [object.elasticity]: give per_area, or stiffness of each node");
+            return Err(checker.at(&format!("object.ground.{key}"), message));
+        }
+        if matches!(stiffness, GroundStiffness::PerVolume(_)) && self.nodes.is_some() {
+            let message = "a volume has no nodes of its own: give below, or leave nodes out";
+            return Err(checker.at("object.ground.nodes", message));
+        }
         let nodes = match (self.nodes, self.below) {
             (None, None) => GroundNodes::All,
             (Some(nodes), None) => GroundNodes::Listed(nodes),
@@ -427,6 +478,6 @@ impl GroundTable {
                 return Err(checker.at("object.ground.below", message));
             }
         };
-        Ok(GroundSpec { stiffness: self.stiffness, nodes })
+        Ok(GroundSpec { stiffness, nodes })
     }
 }

@@ -5,7 +5,6 @@ use crate::{
     JointVector,
     contact::Status,
     gpu::{Context, FrameError, FrameMethod, FrameUpdate, GpuError},
-    object::Factor,
     render::{
         graphics::{ContactForces, Smoothing},
         session::Latest,
@@ -104,16 +103,14 @@ fn extremes(loaded: &Loaded) -> [f64; 2] {
     let (Some(object), Some(forces), Some(q)) = (&loaded.setup.object, &loaded.forces, deepest(loaded)) else {
         return [0.0; 2];
     };
-    let mut displacement = vec![DVec3::ZERO; object.rest.len()];
-    forces.at(&q, 1.0, &mut displacement);
-    let size = |vectors: &[DVec3]| vectors.iter().map(|vector| vector.length()).fold(0.0, f64::max);
-    let force = size(&displacement);
-    // K was proven positive definite when the object was built; where memory lacks, nothing is coloured.
-    match Factor::of(&object.stiffness, 1.0, &vec![0.0; object.rest.len()]) {
-        Ok(factor) => factor.solve(&mut displacement),
-        Err(_) => displacement.fill(DVec3::ZERO),
-    }
-    [size(&displacement), force]
+    let mut acting = vec![DVec3::ZERO; object.rest.len()];
+    forces.at(&q, 1.0, &mut acting);
+    let largest = |sizes: &mut dyn Iterator<Item = DVec3>| sizes.map(|vector| vector.length()).fold(0.0, f64::max);
+    let mut displacement = vec![DVec3::ZERO; object.moved.len()];
+    object.attachment.spread(&acting, &mut displacement);
+    object.factor.solve(&mut displacement);
+    let followers = &mut (0..object.surface_nodes).map(|node| object.attachment.follow(node, &displacement));
+    [largest(followers), largest(&mut acting.into_iter())]
 }
 
 /// The configuration of the motions, or else of the whole dataset, at which the energy is greatest, or the torque.

@@ -6,7 +6,9 @@ use haptize::{
     fixtures::bodies::{self, Ball, PAPER, joint},
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind},
+    scene::{
+        Algorithm, ContactSpec, GroundStiffness, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind,
+    },
 };
 
 /// Springs of 300 N/m and ground of 100 N/m at every node.
@@ -30,7 +32,7 @@ pub fn object(nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Object {
 /// The same object held at every node by springs of this stiffness (N/m).
 pub fn grounded(object: &Object, stiffness: f64) -> Object {
     let mut spec = bodies::sphere_spec(PAPER, SPHERE_CENTRE, 1.0, 1.0);
-    spec.ground.as_mut().unwrap().stiffness = stiffness;
+    spec.ground.as_mut().unwrap().stiffness = GroundStiffness::PerNode(stiffness);
     Object::from_surface(&spec, object.rest.clone(), object.triangles.clone()).unwrap()
 }
 

@@ -6,7 +6,7 @@ use haptize::{
     gpu::{FrameMethod, FrameUpdate},
     object::Object,
     render::graphics::ObjectMotion,
-    scene::{GraphicsEffects, Material, Scene, SkinSpec, SpringKind, SpringSpec, StiffeningSpec},
+    scene::{ElasticSpec, GraphicsEffects, Material, Scene, SkinSpec, SpringKind, SpringSpec, StiffeningSpec},
 };
 
 /// A push on one node for some frames, then none: states of both sides after each frame.
@@ -29,6 +29,10 @@ fn frames_of(object: &Object, method: FrameMethod, check: impl Fn(usize, &Object
         gpu.step(&forces).unwrap();
         let (displacement, velocity) = gpu.read().unwrap();
         check(frame, &twin, &displacement, &velocity);
+        // Sums of some hundred terms rounded by 6e-8 each.
+        let follow = |node: usize| object.attachment.follow(node, &displacement);
+        let followers: Vec<DVec3> = (0..object.rest.len()).map(follow).collect();
+        assert!(relative(&followers, &gpu.drawn().unwrap()) < 1e-5, "frame {frame}: what is drawn");
     }
 }
 
@@ -66,6 +70,14 @@ fn frames_follow_the_cpus() {
     frames_of(&axial, FrameMethod::Inverse, |frame, twin, displacement, velocity| {
         assert!(relative(twin.displacement(), displacement) < 1e-4, "frame {frame}");
         assert!(relative(twin.velocity(), velocity) < 1e-4, "frame {frame}");
+    });
+    // The surface of an elastic solid follows the nodes of its elements.
+    let elastic = ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.03), inclusions: Vec::new() };
+    let (_, solid, _) = load_of("sphere.toml", Some(Material::Elastic(elastic)));
+    assert!(!solid.attachment.is_identity());
+    frames_of(&solid, FrameMethod::Inverse, |frame, twin, displacement, velocity| {
+        assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
+        assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
     });
     let rotated: Vec<DVec3> = [DVec3::X, DVec3::Y].into();
     assert!(relative(&[DVec3::X, DVec3::X], &rotated) > 1.0, "the comparator tells fields apart");

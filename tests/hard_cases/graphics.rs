@@ -10,7 +10,8 @@ use haptize::{
     object::Object,
     render::object_motion::ObjectMotion,
     scene::{
-        GraphicsEffects, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec, StiffeningSpec,
+        GraphicsEffects, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SpringKind, SpringSpec,
+        StiffeningSpec,
     },
 };
 use std::sync::Arc;
@@ -40,7 +41,7 @@ fn sphere(kind: SpringKind, stiffness: f64, effort: Effort) -> Result<Object, Fa
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings, segments: rings },
         material: Material::Springs(SpringSpec { kind, stiffness }),
         skin: None,
-        ground: Some(GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All }),
+        ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(0.3 * stiffness), nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: 0.02,
     })?)

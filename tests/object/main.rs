@@ -7,7 +7,9 @@ mod meshes;
 
 use glam::{DMat3, DVec3};
 use haptize::object::{Compliance, Object, ObjectError, SurfaceDefect};
-use haptize::scene::{GroundNodes, GroundSpec, Material, ObjectSpec, Scene, Shape, SpringKind, SpringSpec};
+use haptize::scene::{
+    GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Scene, Shape, SpringKind, SpringSpec,
+};
 use std::path::{Path, PathBuf};
 
 const CENTRE: DVec3 = DVec3::new(0.1, -0.2, 0.3);
@@ -17,7 +19,7 @@ fn sphere_spec(kind: SpringKind, nodes: GroundNodes) -> ObjectSpec {
         shape: Shape::Sphere { centre: CENTRE, radius: 0.05, rings: 10, segments: 10 },
         material: Material::Springs(SpringSpec { kind, stiffness: 300.0 }),
         skin: None,
-        ground: Some(GroundSpec { stiffness: 100.0, nodes }),
+        ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(100.0), nodes }),
         node_mass: 0.002,
         node_damping: 0.1,
     }
@@ -297,7 +299,7 @@ fn numbers_out_of_range_are_refused_without_a_scene_file_as_well() {
     let alterations: [fn(&mut ObjectSpec); 8] = [
         |spec| spec.material = springs(-1.0),
         |spec| spec.material = springs(f64::NAN),
-        |spec| spec.ground.as_mut().unwrap().stiffness = 0.0,
+        |spec| spec.ground.as_mut().unwrap().stiffness = GroundStiffness::PerNode(0.0),
         |spec| spec.node_mass = f64::INFINITY,
         |spec| spec.node_damping = -0.1,
         |spec| spec.shape = Shape::Sphere { centre: CENTRE, radius: -1.0, rings: 10, segments: 10 },

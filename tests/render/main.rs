@@ -38,8 +38,8 @@ use haptize::{
         trace::{Frame, Tick, Trace},
     },
     scene::{
-        GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, HapticsSpec, Interpolation, Material, ObjectSpec,
-        Scene, Shape, SpringKind, SpringSpec, Waypoint,
+        GraphicsEffects, GraphicsSpec, GroundNodes, GroundSpec, GroundStiffness, HapticsSpec, Interpolation, Material,
+        ObjectSpec, Scene, Shape, SpringKind, SpringSpec, Waypoint,
     },
     sweep::baked,
 };

@@ -8,7 +8,7 @@ fn sphere(stiffness: f64, damping: f64) -> Object {
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings: 10, segments: 10 },
         material: Material::Springs(SpringSpec { kind: SpringKind::Isotropic, stiffness }),
         skin: None,
-        ground: Some(GroundSpec { stiffness: 0.3 * stiffness, nodes: GroundNodes::All }),
+        ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(0.3 * stiffness), nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: damping,
     })

@@ -1,27 +1,34 @@
 //! The surface of tetrahedra: their faces that no other tetrahedron shares.
 
-use crate::object::{Body, solid::volume};
+use crate::object::{
+    Body,
+    tetrahedra::{FACES, face_triangles, volume},
+};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Faces of a tetrahedron of positive volume, counter-clockwise seen from outside.
-const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
-
-/// Orders nodes and tetrahedra; nodes of no tetrahedron are dropped. Also the number of tetrahedra that had to be
-/// turned.
-pub(super) fn order(nodes: &[DVec3], mut tetrahedra: Vec<[u32; 4]>) -> (Body, usize) {
+/// Orders nodes and tetrahedra; nodes of no tetrahedron are dropped. `mid_nodes`: as in [`Body`]. Also the number of
+/// tetrahedra that had to be turned.
+pub(super) fn order(nodes: &[DVec3], mut tetrahedra: Vec<[u32; 4]>, mut mid_nodes: Vec<[u32; 6]>) -> (Body, usize) {
     let mut turned = 0;
-    for corners in &mut tetrahedra {
+    for (number, corners) in tetrahedra.iter_mut().enumerate() {
         if volume(corners.map(|corner| nodes[corner as usize])) < 0.0 {
             corners.swap(2, 3);
+            // Edges 12 and 13, 02 and 03.
+            mid_nodes.get_mut(number).into_iter().for_each(|middles| *middles = [0, 5, 3, 2, 4, 1].map(|m| middles[m]));
             turned += 1;
         }
     }
+    let is_curved = !mid_nodes.is_empty();
+    let of_element = |number: usize, local: usize| match local.checked_sub(4) {
+        None => tetrahedra[number][local],
+        Some(middle) => mid_nodes[number][middle],
+    };
     // Faces that are seen once stay; the other side of one takes it out.
     let mut open: HashMap<[u32; 3], ([u32; 3], usize)> = HashMap::new();
-    for (number, corners) in tetrahedra.iter().enumerate() {
-        for face in FACES {
-            let face = face.map(|k| corners[k]);
+    for number in 0..tetrahedra.len() {
+        for face in FACES.into_iter().flat_map(|face| face_triangles(face, is_curved)) {
+            let face = face.map(|k| of_element(number, k));
             let mut key = face;
             key.sort_unstable();
             if open.remove(&key).is_none() {
@@ -33,7 +40,8 @@ pub(super) fn order(nodes: &[DVec3], mut tetrahedra: Vec<[u32; 4]>) -> (Body, us
     faces.sort_unstable_by_key(|(face, number)| (*number, *face));
     const DROPPED: u8 = 2;
     let mut kind = vec![DROPPED; nodes.len()];
-    tetrahedra.as_flattened().iter().for_each(|&node| kind[node as usize] = 1);
+    let all = tetrahedra.as_flattened().iter().chain(mid_nodes.as_flattened());
+    all.for_each(|&node| kind[node as usize] = 1);
     faces.iter().flat_map(|(face, _)| face).for_each(|&node| kind[node as usize] = 0);
     let mut kept: Vec<u32> = (0..nodes.len() as u32).filter(|&node| kind[node as usize] != DROPPED).collect();
     kept.sort_by_key(|&node| kind[node as usize]);
@@ -44,6 +52,7 @@ pub(super) fn order(nodes: &[DVec3], mut tetrahedra: Vec<[u32; 4]>) -> (Body, us
         surface_nodes: kept.iter().filter(|&&node| kind[node as usize] == 0).count(),
         triangles: faces.into_iter().map(|(face, _)| face.map(|node| numbers[node as usize])).collect(),
         tetrahedra: tetrahedra.into_iter().map(|corners| corners.map(|node| numbers[node as usize])).collect(),
+        mid_nodes: mid_nodes.into_iter().map(|middles| middles.map(|node| numbers[node as usize])).collect(),
         regions: Vec::new(),
     };
     (ordered, turned)

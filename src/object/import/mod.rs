@@ -76,7 +76,7 @@ pub(super) fn read_tetrahedra(
     let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
     let nodes: Vec<DVec3> = mesh.nodes.iter().map(|node| scale * *node + centre).collect();
     warnings.extend(oversize(file, scale, &nodes));
-    let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra);
+    let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra, mesh.mid_nodes);
     let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
         let (file, all) = (file.display(), ordered.tetrahedra.len());

@@ -1,8 +1,8 @@
 //! Tetrahedra from Gmsh files, ASCII of versions 2.2 and 4.1.
 //!
 //! Read are `$MeshFormat`, `$Nodes` (or `$ParametricNodes`), the physical volumes in `$Entities` and
-//! `$PartitionedEntities` (4.1) and the elements of type 4 (tetrahedra of four nodes) in `$Elements`; points, lines and
-//! triangles, which Gmsh writes for boundaries, and all other sections are read past, and other volume elements are
+//! `$PartitionedEntities` (4.1) and the elements of type 4 or 11 (tetrahedra of four or of ten nodes) in `$Elements`;
+//! points, lines and triangles, which Gmsh writes for boundaries, and all other sections are read past, and other volume elements are
 //! refused. A tetrahedron that is written once for each of its physical volumes counts once. The surface is what it
 //! always is: the faces that belong to one tetrahedron only. Every error names the line. Nothing is reserved for what a
 //! file announces before it is there.
@@ -17,6 +17,8 @@ use std::io::BufRead;
 pub(super) struct Mesh {
     pub nodes: Vec<DVec3>,
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Nodes in the middles of their edges, in Gmsh's order; empty in first order.
+    pub mid_nodes: Vec<[u32; 6]>,
     /// Physical volume of each tetrahedron, 0 outside all; empty if the file names none.
     pub regions: Vec<u32>,
 }
@@ -24,6 +26,8 @@ pub(super) struct Mesh {
 /// Tetrahedra as they come.
 struct Tetrahedra<'a> {
     corners: Vec<[u32; 4]>,
+    /// As in [`Mesh`]; as many as there are tetrahedra, or none.
+    mid_nodes: Vec<[u32; 6]>,
     regions: Vec<u32>,
     /// Their numbers, by their corners in ascending order.
     numbers: HashMap<[u32; 4], usize>,
@@ -36,7 +40,9 @@ struct Tetrahedra<'a> {
 }
 
 impl Tetrahedra<'_> {
-    fn add(&mut self, corners: [u32; 4], region: u32) {
+    /// `nodes`: four corners, and in second order six nodes in the middles of edges.
+    fn add(&mut self, nodes: &[u32], region: u32) {
+        let Some((&corners, middles)) = nodes.split_first_chunk() else { return };
         let mut key = corners;
         key.sort_unstable();
         match self.numbers.entry(key) {
@@ -47,6 +53,7 @@ impl Tetrahedra<'_> {
             Entry::Vacant(free) => {
                 free.insert(self.corners.len());
                 self.corners.push(corners);
+                self.mid_nodes.extend(middles.as_chunks().0);
                 self.regions.push(region);
             }
         }
@@ -64,18 +71,23 @@ impl Tetrahedra<'_> {
         };
         if !volumes.is_empty() {
             return Err(format!(
-                "its volume has {} beside {} tetrahedra of four nodes, which alone are read: mesh all of it with \
-                 tetrahedra of first order (gmsh -3 -order 1, without Recombine and layers)",
+                "its volume has {} beside {} tetrahedra of four or ten nodes, which alone are read: mesh all of it \
+                 with tetrahedra of first or second order (gmsh -3 -order 2, without Recombine and layers)",
                 listed(&volumes),
                 self.corners.len()
             ));
+        }
+        if !self.mid_nodes.is_empty() && self.mid_nodes.len() != self.corners.len() {
+            return Err(
+                "it has tetrahedra of four nodes beside some of ten: save all in one order (gmsh -order 2)".into()
+            );
         }
         if self.corners.is_empty() {
             let others: Vec<(u64, u64)> = self.others.iter().map(|(kind, count)| (*kind, *count)).collect();
             let only = if others.is_empty() { String::new() } else { format!(", but {}", listed(&others)) };
             return Err(format!(
-                "it has no tetrahedra of four nodes{only}: mesh the volume in first order (gmsh -3 -order 1); where \
-                 there are physical groups, Gmsh saves only what is in one"
+                "it has no tetrahedra of four or ten nodes{only}: mesh the volume (gmsh -3 -order 2); where there are \
+                 physical groups, Gmsh saves only what is in one"
             ));
         }
         Ok(())
@@ -88,8 +100,14 @@ fn choice(groups: &[u32], wanted: &[u32]) -> u32 {
     named.or_else(|| groups.iter().find(|group| **group != 0)).copied().unwrap_or(0)
 }
 
-/// Gmsh's number for a tetrahedron of four nodes.
-const TETRAHEDRON: u64 = 4;
+/// Number of nodes of an element of Gmsh's type `kind`, if it is a tetrahedron of first or second order.
+fn nodes_of(kind: u64) -> Option<usize> {
+    match kind {
+        4 => Some(4),
+        11 => Some(10),
+        _ => None,
+    }
+}
 
 /// Is that Gmsh's number for a point, a line, a triangle, a quadrangle or a polygon, of any order?
 fn is_boundary(kind: u64) -> bool {
@@ -105,7 +123,6 @@ fn name(kind: u64) -> &'static str {
         5 | 12 | 17 => "hexahedra",
         6 | 13 | 18 => "prisms",
         7 | 14 | 19 => "pyramids",
-        11 => "tetrahedra of ten nodes",
         15 => "points",
         _ => "elements",
     }
@@ -119,6 +136,7 @@ pub(super) fn read(stream: &mut impl BufRead, wanted: &[u32]) -> Result<Mesh, St
     let mut nodes = Nodes::default();
     let mut tetrahedra = Tetrahedra {
         corners: Vec::new(),
+        mid_nodes: Vec::new(),
         regions: Vec::new(),
         numbers: HashMap::new(),
         volumes: HashMap::new(),
@@ -156,11 +174,11 @@ pub(super) fn read(stream: &mut impl BufRead, wanted: &[u32]) -> Result<Mesh, St
         return Err("it has no $MeshFormat: it is no Gmsh file".to_owned());
     }
     tetrahedra.check()?;
-    let Tetrahedra { corners: tetrahedra, mut regions, .. } = tetrahedra;
+    let Tetrahedra { corners: tetrahedra, mid_nodes, mut regions, .. } = tetrahedra;
     if regions.iter().all(|region| *region == 0) {
         regions.clear();
     }
-    Ok(Mesh { nodes: nodes.positions, tetrahedra, regions })
+    Ok(Mesh { nodes: nodes.positions, tetrahedra, mid_nodes, regions })
 }
 
 #[derive(Clone, Copy)]
@@ -186,12 +204,13 @@ impl Nodes {
         Ok(())
     }
 
-    fn corners(&self, lines: &Lines<'_, impl BufRead>, tags: [u64; 4]) -> Result<[u32; 4], String> {
-        let mut corners = [0; 4];
-        for (corner, tag) in corners.iter_mut().zip(tags) {
-            *corner = *self.numbers.get(&tag).ok_or_else(|| lines.error(&format!("there is no node {tag}")))?;
-        }
-        Ok(corners)
+    /// The nodes of an element of `count` nodes, whose tags begin with number `first` of the line.
+    fn element(&self, lines: &Lines<'_, impl BufRead>, first: usize, count: usize) -> Result<Vec<u32>, String> {
+        let node = |k: usize| -> Result<u32, String> {
+            let tag: u64 = lines.number_at(first + k)?;
+            self.numbers.get(&tag).copied().ok_or_else(|| lines.error(&format!("there is no node {tag}")))
+        };
+        (0..count).map(node).collect()
     }
 }
 
@@ -388,18 +407,14 @@ fn elements_2(
         lines.require()?;
         // Number, type, count of labels, labels, nodes.
         let ([_, kind, labels], all) = lines.numbers::<u64, 3>()?;
-        if kind == TETRAHEDRON {
+        if let Some(count) = nodes_of(kind) {
             let first = usize::try_from(labels).unwrap_or(usize::MAX).saturating_add(3);
-            if first.saturating_add(4) != all {
-                return Err(lines.error("a tetrahedron must have four nodes"));
+            if first.saturating_add(count) != all {
+                return Err(lines.error(&format!("a tetrahedron of type {kind} must have {count} nodes")));
             }
             // The first label is the physical volume.
             let region = if labels > 0 { region(lines, lines.number_at(3)?)? } else { 0 };
-            let mut tags = [0; 4];
-            for (k, tag) in tags.iter_mut().enumerate() {
-                *tag = lines.number_at(first + k)?;
-            }
-            tetrahedra.add(nodes.corners(lines, tags)?, region);
+            tetrahedra.add(&nodes.element(lines, first, count)?, region);
         } else {
             *tetrahedra.others.entry(kind).or_default() += 1;
         }
@@ -423,12 +438,12 @@ fn elements_4(
         let region = tetrahedra.volumes.get(&entity).copied().unwrap_or(0);
         for _ in 0..count {
             lines.require()?;
-            if kind == TETRAHEDRON {
-                let ([_, tags @ ..], all) = lines.numbers::<u64, 5>()?;
-                if all != 5 {
-                    return Err(lines.error("a tetrahedron must have four nodes"));
+            if let Some(count) = nodes_of(kind) {
+                let (_, all) = lines.numbers::<u64, 1>()?;
+                if all != count + 1 {
+                    return Err(lines.error(&format!("a tetrahedron of type {kind} must have {count} nodes")));
                 }
-                tetrahedra.add(nodes.corners(lines, tags)?, region);
+                tetrahedra.add(&nodes.element(lines, 1, count)?, region);
             } else {
                 *tetrahedra.others.entry(kind).or_default() += 1;
             }

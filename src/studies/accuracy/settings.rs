@@ -15,7 +15,7 @@ use crate::{
     contact::{Model, Status},
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, Scene, Shape, SkinSpec},
+    scene::{Algorithm, ContactSpec, GroundSpec, GroundStiffness, Scene, Shape, SkinSpec},
     sweep::reference::{Reference, equilibria},
 };
 use toml::{Table, Value};
@@ -155,7 +155,9 @@ fn meshes(scene: &Scene) -> Vec<Variant> {
             }
             _ => return Vec::new(),
         };
-        scene.object.ground.iter_mut().for_each(|ground| ground.stiffness *= area);
+        if let Some(GroundSpec { stiffness: GroundStiffness::PerNode(k), .. }) = &mut scene.object.ground {
+            *k *= area;
+        }
         if variants.last().is_none_or(|last| last.scene.object != scene.object) {
             let (value, setting) = (area.sqrt(), format!("{factor} of the mean edge"));
             variants.push(Variant { scene, series: "mesh", setting, value });

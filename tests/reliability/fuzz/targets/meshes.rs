@@ -5,7 +5,9 @@ use crate::program;
 use glam::DVec3;
 use haptize::{
     object::Object,
-    scene::{ElasticSpec, GroundNodes, GroundSpec, Material, ObjectSpec, Shape, SpringKind, SpringSpec},
+    scene::{
+        ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SpringKind, SpringSpec,
+    },
     urdf::{self, Arm, Robot, UrdfError},
 };
 use std::path::Path;
@@ -21,7 +23,7 @@ fn mesh(file: &Path, input: &[u8], refine: Option<f64>, material: Material) -> S
     } else {
         Shape::Mesh { file, scale, centre, refine }
     };
-    let ground = Some(GroundSpec { stiffness: 10.0, nodes: GroundNodes::All });
+    let ground = Some(GroundSpec { stiffness: GroundStiffness::PerNode(10.0), nodes: GroundNodes::All });
     outcome(Object::build(&ObjectSpec { shape, material, skin: None, ground, node_mass: 0.01, node_damping: 0.1 }))
 }
 

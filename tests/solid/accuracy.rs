@@ -1,0 +1,83 @@
+//! Compliance under a pressure as contact has it, against converged solutions (`tests/references/solids.csv`).
+
+use super::*;
+
+/// Radius of the pressure (m).
+const RADIUS: f64 = 0.01;
+
+/// The converged compliance of `body` (m/N).
+fn reference(body: &str, poisson: f64) -> f64 {
+    let text = include_str!("../references/solids.csv");
+    let row = text.lines().find(|line| line.starts_with(&format!("{body},{poisson},"))).unwrap();
+    row.rsplit(',').next().unwrap().parse().unwrap()
+}
+
+/// Mean displacement under the pressure `3/(pi a^2) (1 - r^2/a^2)^2` around `middle` along `-up`, over its force (m/N).
+fn compliance(object: &Object, middle: DVec3, up: DVec3) -> f64 {
+    let areas = own_areas(object);
+    let mut forces = vec![DVec3::ZERO; object.rest.len()];
+    for (node, area) in areas.iter().enumerate() {
+        let across = object.rest[node] - middle;
+        let squared = (across - up * across.dot(up)).length_squared() / (RADIUS * RADIUS);
+        if squared < 1.0 && across.length() < 2.0 * RADIUS {
+            forces[node] = -up * (1.0 - squared).powi(2) * area.dot(up);
+        }
+    }
+    let force: f64 = forces.iter().map(|force| force.length()).sum();
+    let u = displaced(object, &forces);
+    forces.iter().zip(&u).map(|(force, u)| force.dot(*u)).sum::<f64>() / (force * force)
+}
+
+/// The block of the references with a surface of squares of a quarter of the radius of contact.
+fn pressed_block(poisson: f64, cell: Option<f64>, ground: GroundSpec, turn: DMat3, shift: DVec3) -> f64 {
+    let shell = block([40, 40, 20], 0.0025);
+    let block = solid(shell, elastic(poisson, cell), ground, turn, shift);
+    compliance(&block, turn * DVec3::Z * 0.05 + shift, turn * DVec3::Z)
+}
+
+const RATIOS: [f64; 4] = [0.3, 0.45, 0.49, 0.499];
+
+#[test]
+fn a_block_gives_way_as_converged_solutions_do_whatever_the_ratio_of_poisson() {
+    for poisson in RATIOS {
+        let block = |cell| pressed_block(poisson, cell, clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO);
+        let error = block(None) / reference("block", poisson) - 1.0;
+        println!("block, nu {poisson}: {error:.4}");
+        assert!(error.abs() < 0.03, "nu {poisson}: {error}");
+    }
+}
+
+#[test]
+fn a_ball_on_springs_per_volume_gives_way_as_the_axisymmetric_solution_does() {
+    let ground = GroundSpec { stiffness: GroundStiffness::PerVolume(4e9), nodes: GroundNodes::Below(-0.035) };
+    for poisson in RATIOS {
+        let shape = Shape::Icosphere { centre: DVec3::ZERO, radius: 0.05, divisions: 18 };
+        let ball = Object::build(&spec(shape, elastic(poisson, None), ground.clone())).unwrap();
+        let error = compliance(&ball, DVec3::Z * 0.05, DVec3::Z) / reference("sphere", poisson) - 1.0;
+        println!("sphere, nu {poisson}: {error:.4}");
+        assert!(error.abs() < 0.03, "nu {poisson}: {error}");
+    }
+}
+
+/// Where the lattice lies does not matter: other sizes of cubes shift all of them against the block, or it is turned.
+#[test]
+fn offsets_and_turns_of_the_lattice_change_compliance_by_less_than_two_percent() {
+    let (nodes, _) = block([40, 40, 20], 0.0025);
+    let under = (0..).zip(&nodes).filter(|(_, node)| node.z < 1e-6).map(|(node, _)| node).collect();
+    let bed = GroundSpec { stiffness: GroundStiffness::PerArea(1e8), nodes: GroundNodes::Listed(under) };
+    let compliance = |cell, turn| pressed_block(0.45, cell, bed.clone(), turn, DVec3::ZERO);
+    let aligned = compliance(None, DMat3::IDENTITY);
+    let error = aligned / reference("bed", 0.45) - 1.0;
+    assert!(error.abs() < 0.03, "{error}");
+    for cell in [0.0063, 0.0065, 0.0067, 0.0069, 0.0071, 0.0073] {
+        let error = compliance(Some(cell), DMat3::IDENTITY) / aligned - 1.0;
+        println!("cells of {cell} m: {error:.4}");
+        assert!(error.abs() < 0.02, "cells of {cell} m: {error}");
+    }
+    for (axis, degrees) in [(DVec3::ONE, 30.0), (DVec3::new(1.0, 2.0, 0.0), 17.0), (DVec3::Z, 40.0)] {
+        let turn = DMat3::from_axis_angle(axis.normalize(), f64::to_radians(degrees));
+        let error = compliance(None, turn) / aligned - 1.0;
+        println!("turned by {degrees} degrees: {error:.4}");
+        assert!(error.abs() < 0.02, "turned by {degrees} degrees around {axis}: {error}");
+    }
+}
