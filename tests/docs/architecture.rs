@@ -31,7 +31,6 @@ const SHARED_NAMES: &[&str] = &[
     "Plan",
     "Port",
     "Quantity",
-    "Recorded",
     "Row",
     "Session",
     "Shape",
