@@ -21,8 +21,8 @@ use std::{
 const KILLS: usize = 4;
 
 /// A bake of `scene.toml` into `x.haptize`, continued if there is anything.
-fn bake(backend: &str) -> [&str; 7] {
-    ["bake", "scene.toml", "-o", "x.haptize", "--backend", backend, "--resume"]
+fn bake(backend: &str) -> [&str; 9] {
+    ["bake", "scene.toml", "-o", "x.haptize", "--backend", backend, "--geometry", "rest", "--resume"]
 }
 
 /// Header without date and checksum, and data.
