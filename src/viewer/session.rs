@@ -65,7 +65,14 @@ impl Session {
     }
 
     /// Plane and cloud of C-space, one below the other, or one of them where there is no height for both.
+    /// A scene that is solved live has nothing to show there, and says what would fill them.
     pub fn configuration_space(&mut self, ui: &mut Ui, q: &JointVector) {
+        if self.loaded.live.is_some() {
+            ui.heading("C-space");
+            ui.add_space(GAP);
+            ui.label("Contact is solved live, in every tick, and nothing is stored. Bake the scene to see it over its grid here.");
+            return;
+        }
         let both = ui.available_height() > ROOM_FOR_BOTH;
         ui.horizontal(|ui| {
             ui.heading("C-space");

@@ -302,4 +302,5 @@ fn a_scene_is_felt_and_seen_before_anything_of_it_is_baked() {
     window.harness.run_ok();
     assert!(window.torque() > 0.02, "{} N m", window.torque());
     assert!(window.shows("solved live") && window.shows("displacement"));
+    assert!(window.shows("Bake the scene to see it over its grid") && !window.shows("Plane of C-space"));
 }
