@@ -17,7 +17,7 @@ use std::{
     time::SystemTime,
 };
 
-/// Bytes at the start of a file by which those of haptize are known: its name stands there in most.
+/// Bytes at the start of a file by which those of haptize are known.
 const START: u64 = 1024;
 
 /// How logs of scans and records of sessions begin.
@@ -48,14 +48,15 @@ impl Content {
         let holds = |word: &[u8]| start.windows(word.len()).any(|part| part == word);
         let begins = |magic: &[u8]| start.starts_with(magic);
         let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
-        // A scene may name haptize, and is the work of a person.
-        let text = holds(b"haptize") && !begins(b"#") || begins(b"# The paper's");
+        // A text may name haptize, and be the work of a person: a scene, a script.
+        let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg"));
+        let page = holds(b".TH haptize") || begins(b"# The paper's");
         let archive = begins(b"PK") && holds(b"torque.npy");
         let hdf5 = begins(b"\x89HDF") && holds(b"torque");
         match () {
             () if may_be_dataset(start) => Some(Self::Dataset),
             () if log => Some(Self::Log),
-            () if text || archive || hdf5 || is_table(start) => Some(Self::Product),
+            () if figure || page || archive || hdf5 || is_table(start) => Some(Self::Product),
             () => None,
         }
     }
