@@ -61,8 +61,8 @@ pub enum GpuError {
     NoClock(String),
     /// The kernel takes contact with the surface at rest alone.
     #[error(
-        "the GPU solves contact with the surface at rest, not by the algorithm {0}. Use --geometry rest, or \
-         --backend cpu"
+        "the GPU solves contact with the surface at rest, not by the algorithm {0}. Name `geometry = \"rest\"` in the \
+         scene's [contact], or use --backend cpu"
     )]
     Algorithm(&'static str),
     /// Outputs that no invocation wrote: a dispatch was cut short.

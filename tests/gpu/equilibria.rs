@@ -368,6 +368,6 @@ fn other_algorithms_are_refused() {
         let refusal = GpuSolver::new(context(), &model).err().unwrap();
         assert!(matches!(refusal, GpuError::Algorithm(_)), "{refusal}");
         let said = refusal.to_string();
-        assert!(said.contains(algorithm.name()) && said.contains("--geometry rest"), "{said}");
+        assert!(said.contains(algorithm.name()) && said.contains("geometry = \"rest\""), "{said}");
     }
 }
