@@ -14,7 +14,7 @@ use haptize::{
     object::{Factor, Object},
     proxy::Chain,
     render::{coupling::Coupling, npmi, session, setup::Setup, trace::Trace},
-    scene::{Algorithm, ContactSpec, EFFECTS, Effect, Rendering, Scene},
+    scene::{ContactLaw, ContactSpec, EFFECTS, Effect, Rendering, Scene},
     sweep,
 };
 use std::{
@@ -313,7 +313,7 @@ fn on_the_gpu_each_effect_makes_its_own_buffers_and_pipelines_and_no_others() {
     let [plain, felt] = [&[][..], &EFFECTS[..5]].map(|effects| {
         let scene = sphere().with_effects(false, effects).unwrap();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
-        let model = Model::new(&object, &chain, ContactSpec { algorithm: Algorithm::Rest, ..scene.contact });
+        let model = Model::new(&object, &chain, ContactSpec { law: ContactLaw::Rest, ..scene.contact });
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let (solver, found) = made(&context, || GpuSolver::new(Arc::clone(&context), &model).unwrap());
         drop(solver);

@@ -8,10 +8,9 @@ use crate::{
     field::TorqueField,
     object::Object,
     proxy::Chain,
-    scene::{self, Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, Scene},
+    scene::{self, AxisSpec, GRID_STEP_SLACK, GridSpec, Scene},
     sweep::{Inspection, build_object},
 };
-use clap::ValueEnum;
 use glam::DVec3;
 use std::{
     fmt::{self, Write},
@@ -154,15 +153,9 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
         .into());
     };
     let wrong = |why: String| format!("{}: the scene in the dataset: {why}", path.display());
-    let mut scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(error.to_string()))?;
+    let law = &dataset.provenance.algorithm;
+    let scene = Scene::of_dataset(&dataset.scene, "scene", law).map_err(|error| wrong(error.to_string()))?;
     dataset.check_scene().map_err(wrong)?;
-    let algorithm = &dataset.provenance.algorithm;
-    scene.contact.algorithm = Algorithm::from_str(algorithm, true).map_err(|_| {
-        wrong(format!(
-            "it was solved by the algorithm `{}`, which is no more: bake it anew",
-            crate::names::escaped(algorithm)
-        ))
-    })?;
     let object = surface.object(&scene.object)?;
     Ok((scene, object, Some(dataset)))
 }

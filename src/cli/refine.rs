@@ -11,7 +11,7 @@ use crate::{
     scene::Scene,
     store::Store,
     sweep::{
-        Aim, BackendChoice, ChosenBackend, CpuBackend, build_object, check_algorithm, grid_of,
+        Aim, BackendChoice, ChosenBackend, CpuBackend, build_object, check_law, grid_of,
         refine::{Judge, Refine, Refined},
         sample,
     },
@@ -37,7 +37,7 @@ pub struct RefinementGoal<'a> {
 /// Refines, measures and writes. Exit code 1 where the error that is measured is larger than asked for.
 pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
     let began = Instant::now();
-    check_algorithm(scene)?;
+    check_law(scene)?;
     let aim = wanted.aim.checked(scene)?;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);

@@ -103,7 +103,7 @@ impl MeasuredError {
         let mut lines: Vec<String> = errors.into_iter().map(line).collect();
         if let Some(GeometryError { rms, depth }) = self.geometry {
             let remedy = if rms > TELLING_GEOMETRY * self.torque {
-                ": geometry = \"following\" errs by none of that, and takes 4 to 8 times as long on a CPU"
+                ": law = \"following\" errs by none of that, and takes 4 to 8 times as long on a CPU"
             } else {
                 ""
             };
@@ -144,7 +144,7 @@ mod tests {
         let told =
             |rms| MeasuredError { geometry: Some(GeometryError { rms, depth: 0.0123 }), ..measured.clone() }.lines();
         assert_eq!(told(0.3)[2], "`geometry` at rest 3.0 % rms, at depths up to 12.3 mm");
-        assert!(told(0.6)[2].contains("6.0 % rms") && told(0.6)[2].contains("geometry = \"following\""));
+        assert!(told(0.6)[2].contains("6.0 % rms") && told(0.6)[2].contains("law = \"following\""));
         assert_eq!(MeasuredError::default().lines(), ["nothing touches"]);
         // What was not measured is not taken for perfect.
         let unknown = MeasuredError { interpolation: "direct".into(), ..measured };

@@ -2,11 +2,10 @@
 //!
 //! The scene chooses the way ([`Interpolation`]): `linear` (`linear.rs`) interpolates the torque and holds it behind a
 //! boundary layer; `potential` (`potential.rs`) interpolates the energy and takes its gradient, over the points of a
-//! uniform grid (`grid_root.rs`) or the nodes of the store that refines one; `direct`, of a scene that is meant to be
-//! solved live, is `potential` in a dataset. All are continuous and without memory. What they share is in
-//! `points.rs`: the fade outside the grid, what is said of points that were not computed or did not converge, and the
-//! contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at
-//! free points.
+//! uniform grid (`grid_root.rs`) or the nodes of the store that refines one. Both are
+//! continuous and without memory. What they share is in `points.rs`: the fade outside the grid, what is said of points
+//! that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is
+//! stored (contact, unconverged, overflowed) and 0 at free points.
 //!
 //! Another way is a variant of [`Interpolation`], a file here that implements `Interpolant`, and its line in
 //! [`TorqueField::interpolated`].
@@ -125,9 +124,7 @@ impl TorqueField {
         let interpolant: Box<dyn Interpolant> = match (&dataset.refinement, interpolation) {
             (Some(store), _) => Box::new(Potential::new(Arc::clone(store), 0.0)),
             (None, Interpolation::Linear) => Box::new(Linear::new(Checked::new(dataset)?, threshold, slope)?),
-            (None, Interpolation::Potential | Interpolation::Direct) => {
-                Box::new(GridRoot::potential(Checked::new(dataset)?)?)
-            }
+            (None, Interpolation::Potential) => Box::new(GridRoot::potential(Checked::new(dataset)?)?),
         };
         Ok(Self {
             grid,

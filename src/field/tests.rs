@@ -287,7 +287,7 @@ fn a_linear_object_is_rendered_exactly_by_its_gap_and_by_its_potential() {
             match interpolation {
                 // The paper's boundary and the kink behind it: a quarter of a cell's torque.
                 Interpolation::Linear => assert!(worst > 0.02, "{joints} joints: {worst}"),
-                Interpolation::Potential | Interpolation::Direct => {
+                Interpolation::Potential => {
                     assert!(worst < 1e-12, "{joints} joints: {worst}");
                 }
             }

@@ -11,7 +11,7 @@ use crate::{
     dataset::{Axis, Dataset, Grid, Surface},
     field::{Flags, Sample},
     object::Object,
-    scene::{Algorithm, Scene},
+    scene::{ContactLaw, Scene},
     sweep::{BakeError, CpuBackend, Direct, build_object, sample},
 };
 
@@ -47,8 +47,8 @@ impl LiveScene {
     /// # Errors
     /// When its compliance cannot be formed.
     pub fn of(mut scene: Scene, object: Object) -> Result<Self, BakeError> {
-        let follows = scene.contact.algorithm != Algorithm::Rest;
-        scene.contact.algorithm = Algorithm::Rest;
+        let follows = scene.contact.law != ContactLaw::Rest;
+        scene.contact.law = ContactLaw::Rest;
         let direct = Direct::of(&scene, object)?;
         let grid = region(&scene, direct.model().compliance.is_whole());
         let tangents = tangents(direct.model(), &sample(&scene));

@@ -8,7 +8,7 @@ use super::object::ObjectTable;
 use super::proxy::ProxyTable;
 use super::scan::ScanTable;
 use super::{
-    Algorithm, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
+    ContactLaw, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
     SceneError, shape,
 };
 use crate::names;
@@ -78,7 +78,7 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     let mut haptics = take(&mut table.haptics);
     // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
     // energy.
-    let solved = table.contact.as_ref().is_some_and(|contact| contact.algorithm != Some(Algorithm::Paper));
+    let solved = table.contact.as_ref().is_some_and(|contact| contact.law != Some(ContactLaw::Paper));
     if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
         haptics.interpolation = Interpolation::Linear;
     }

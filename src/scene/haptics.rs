@@ -137,30 +137,21 @@ pub enum ProxyInertia {
 pub enum Interpolation {
     /// Multilinear torque behind the boundary of the contact index (section 3.1).
     Linear,
-    /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop.
+    /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop. Scenes of datasets that
+    /// were filled while they were felt named it `direct`.
+    #[serde(alias = "direct")]
     Potential,
-    /// The equilibrium at rest, solved in every tick, of a scene that is felt itself; in a dataset `potential`.
-    Direct,
 }
 
 impl Interpolation {
     /// All between the points of a grid, from the roughest on.
     pub const ALL: [Self; 2] = [Self::Linear, Self::Potential];
 
-    /// All that a scene may name.
-    pub const NAMED: [Self; 3] = [Self::Linear, Self::Potential, Self::Direct];
-
-    /// The one of [`Interpolation::ALL`] by which a dataset answers where the scene names this one.
-    #[must_use]
-    pub fn in_a_dataset(self) -> Self {
-        if self == Self::Direct { Self::Potential } else { self }
-    }
-
     /// Whether the torque is the gradient of an interpolated energy, which a dataset must hold; a boundary layer limits
     /// the others'.
     #[must_use]
     pub fn is_potential(self) -> bool {
-        self.in_a_dataset() == Self::Potential
+        self == Self::Potential
     }
 
     /// As the scene names it.
@@ -169,7 +160,6 @@ impl Interpolation {
         match self {
             Self::Linear => "linear",
             Self::Potential => "potential",
-            Self::Direct => "direct",
         }
     }
 }

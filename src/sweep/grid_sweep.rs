@@ -139,7 +139,7 @@ impl<'a> Sweep<'a> {
             scene_path: std::path::absolute(&scene.path).unwrap_or_default().to_string_lossy().into_owned(),
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").into(),
-                algorithm: scene.contact.algorithm.name().into(),
+                algorithm: scene.contact.law.name().into(),
                 tolerance: scene.contact.tolerance,
                 backend: backend.into(),
                 adapter: adapter.into(),
@@ -180,12 +180,12 @@ impl<'a> Sweep<'a> {
     }
 
     /// Replaces equilibria by lower ones that are reached from those of neighbouring points, where the scene's
-    /// algorithm minimises the energy: U then has no jumps. `model` is that of the scene.
+    /// law minimises the energy: U then has no jumps. `model` is that of the scene.
     ///
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
     pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
-        if lowest::applies(model.contact.algorithm) {
+        if lowest::applies(model.contact.law) {
             self.lowest = Some(self.fitting(model)?);
             self.shape.with_forces = true;
         }
@@ -209,7 +209,7 @@ impl<'a> Sweep<'a> {
         if let Some(asked) = configurations.filter(|asked| *asked > MOST_CONFIGURATIONS) {
             return Err(SweepError::Configurations { asked });
         }
-        let interpolation = haptics.interpolation.in_a_dataset();
+        let interpolation = haptics.interpolation;
         self.error = Some(ErrorCheck { model, threshold, slope, interpolation, configurations, lowest });
         Ok(())
     }

@@ -28,7 +28,7 @@ use crate::{
     JointVector,
     contact::{Equilibrium, Model, NodeForce, Solver, Solvers, Status},
     dataset::Grid,
-    scene::Algorithm,
+    scene::ContactLaw,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -112,10 +112,10 @@ struct UniformGrid<'a, 't> {
     shape: Shape,
 }
 
-/// Whether `scene`s of this algorithm have several equilibria of which the lowest counts: the paper's steps define its
+/// Whether scenes of this `law` have several equilibria of which the lowest counts: the paper's steps define its
 /// result, and contact with the geometry at rest has one equilibrium.
-pub(super) fn applies(algorithm: Algorithm) -> bool {
-    algorithm == Algorithm::Energy
+pub(super) fn applies(law: ContactLaw) -> bool {
+    law == ContactLaw::Following
 }
 
 /// Replaces equilibria in `table` by lower ones. `None` when it was stopped.

@@ -23,7 +23,7 @@ use crate::{
     dataset::{Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
-    scene::{Algorithm, ContactSpec, EffortNorm, Interpolation},
+    scene::{ContactLaw, ContactSpec, EffortNorm, Interpolation},
 };
 use rayon::prelude::*;
 use std::{
@@ -140,10 +140,10 @@ impl ErrorCheck<'_> {
     /// Returns what contact at rest, of which `reference` has the torques, leaves out; none by another law.
     fn geometry_error(&self, reference: &Reference) -> Option<GeometryError> {
         let contact = self.model.contact;
-        if contact.algorithm != Algorithm::Rest {
+        if contact.law != ContactLaw::Rest {
             return None;
         }
-        let mut following = self.model.with_contact(ContactSpec { algorithm: Algorithm::Energy, ..contact });
+        let mut following = self.model.with_contact(ContactSpec { law: ContactLaw::Following, ..contact });
         following.with_tangent = false;
         let solvers = Solvers::new(&following, rayon::current_num_threads());
         let solved = solvers.map(&reference.places, |solver, q| solver.solve(q));

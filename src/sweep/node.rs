@@ -22,7 +22,7 @@ use crate::{
     contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
     field::{GRADIENT_STEP, LEAST_ENERGY},
     joint_matrix,
-    scene::{Algorithm, Scene},
+    scene::{ContactLaw, Scene},
     store::{
         Space,
         record::{mixed, slope, width},
@@ -45,20 +45,20 @@ const FARTHEST: f64 = 2.0;
 /// Most Newton steps to the boundary: the gap is nearly linear, and each step squares the error.
 const STEPS: usize = 6;
 
-/// The scene's algorithm gives no energy with a tangent.
+/// The scene's law of contact gives no energy with a tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the scene's algorithm is \"paper\", and nodes that refine a grid need the energy of contact with its tangent: leave \
-     algorithm out of [contact], or bake the grid alone"
+    "the scene's law of contact is \"paper\", and nodes that refine a grid need the energy of contact with its tangent: leave \
+     law out of [contact], or bake the grid alone"
 )]
 pub struct NoEnergy;
 
 /// Checks that nodes can be solved of `scene`.
 ///
 /// # Errors
-/// [`NoEnergy`] where its algorithm is [`Algorithm::Paper`].
-pub fn check_algorithm(scene: &Scene) -> Result<(), NoEnergy> {
-    if scene.contact.algorithm == Algorithm::Paper { Err(NoEnergy) } else { Ok(()) }
+/// [`NoEnergy`] where its law is [`ContactLaw::Paper`].
+pub fn check_law(scene: &Scene) -> Result<(), NoEnergy> {
+    if scene.contact.law == ContactLaw::Paper { Err(NoEnergy) } else { Ok(()) }
 }
 
 /// A solved node.

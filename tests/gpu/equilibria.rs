@@ -9,7 +9,7 @@ use haptize::{
     joint_matrix::lower,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    scene::{ContactLaw, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
     sweep::Backend,
 };
 use std::sync::Arc;
@@ -254,7 +254,7 @@ const LONG_ARM: &str = r#"
     ground = { stiffness = 100.0 }
     [contact]
     stiffness = 300.0
-    geometry = "rest"
+    law = "rest"
     surface = "facets"
     [grid]
     axes = [{ start = 0.60, stop = 0.64, count = 101 }, { start = -0.03, stop = 0.03, count = 31 }]
@@ -363,11 +363,11 @@ fn other_algorithms_are_refused() {
     let (scene, object, chain) = load("sphere.toml");
     let mut model = Model::new(&object, &chain, scene.contact);
     assert!(GpuSolver::new(context(), &model).is_ok());
-    for algorithm in [Algorithm::Energy, Algorithm::Paper] {
-        model.contact.algorithm = algorithm;
+    for law in [ContactLaw::Following, ContactLaw::Paper] {
+        model.contact.law = law;
         let refusal = GpuSolver::new(context(), &model).err().unwrap();
-        assert!(matches!(refusal, GpuError::Algorithm(_)), "{refusal}");
+        assert!(matches!(refusal, GpuError::Law(_)), "{refusal}");
         let said = refusal.to_string();
-        assert!(said.contains(algorithm.name()) && said.contains("geometry = \"rest\""), "{said}");
+        assert!(said.contains(law.name()) && said.contains("law = \"rest\""), "{said}");
     }
 }

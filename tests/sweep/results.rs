@@ -9,7 +9,7 @@ use haptize::{
     fixtures::Random,
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, JointKind, LEVER_ARM, Scene},
+    scene::{ContactLaw, ContactSpec, JointKind, LEVER_ARM, Scene},
     sweep::{BackendChoice, Bake, CpuBackend, FreeSpace, Run, Sweep},
 };
 use std::sync::atomic::AtomicBool;
@@ -37,7 +37,7 @@ fn the_dataset_is_what_the_backend_answered_at_every_grid_point() {
         assert_eq!(forces, expected);
     }
     assert_eq!(dataset.scene, SCENE);
-    assert_eq!(dataset.provenance.algorithm, "energy");
+    assert_eq!(dataset.provenance.algorithm, "rest");
 
     let answers: Vec<_> = (0..POINTS).map(|point| answer(&dataset.grid.configuration(point))).collect();
     let count = |status| answers.iter().filter(|answer| answer.status == status).count();
@@ -82,7 +82,7 @@ fn the_error_of_the_geometry_at_rest_is_stated() {
         let (dataset, _) = bake.in_memory().unwrap();
         (dataset.provenance.backend, dataset.provenance.error.unwrap())
     };
-    scene.contact.algorithm = Algorithm::Rest;
+    scene.contact.law = ContactLaw::Rest;
     // No GPU takes it.
     let (backend, error) = stated(&scene);
     let geometry = error.geometry.unwrap();
@@ -90,7 +90,7 @@ fn the_error_of_the_geometry_at_rest_is_stated() {
 
     let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
     let rest = Model::new(&object, &chain, scene.contact);
-    let following = rest.with_contact(ContactSpec { algorithm: Algorithm::Energy, ..scene.contact });
+    let following = rest.with_contact(ContactSpec { law: ContactLaw::Following, ..scene.contact });
     let (mut at_rest, mut deformed, mut random) = (Solver::new(&rest), Solver::new(&following), Random::new(4));
     let (mut square, mut off, mut deepest) = (0.0, 0.0, 0.0_f64);
     for _ in 0..1500 {
@@ -111,7 +111,7 @@ fn the_error_of_the_geometry_at_rest_is_stated() {
     assert!(found > 0.4 * expected && found < 2.5 * expected, "{found} {expected}");
     assert!(geometry.depth > 0.6 * deepest && geometry.depth < 1.6 * deepest, "{} {deepest}", geometry.depth);
 
-    scene.contact.algorithm = Algorithm::Energy;
+    scene.contact.law = ContactLaw::Following;
     assert!(stated(&scene).1.geometry.is_none());
 }
 

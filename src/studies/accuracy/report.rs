@@ -1,6 +1,6 @@
 //! The files of a study: its table as CSV, and three work-precision diagrams, error up, cost across, both logarithmic.
 
-use super::{Accuracy, Row, Study, limits, offers};
+use super::{Accuracy, Row, Study, limits, live::LIVE, offers};
 use crate::{
     csv::{Table, quoted},
     draw::{
@@ -10,7 +10,7 @@ use crate::{
         plot::{Entry, Mark},
     },
     report::{ReportError, write, write_both},
-    scene::{Algorithm, Interpolation},
+    scene::{ContactLaw, Interpolation},
 };
 use std::{
     fmt::{self, Write as _},
@@ -53,7 +53,7 @@ fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
             Study::Spacing => "spacing",
             Study::Lookup => "look-up",
             Study::Tolerance => "tolerance",
-            Study::Algorithm => "algorithm",
+            Study::Law => "law",
             Study::Mesh => "mesh",
             Study::Links => "link nodes",
             Study::Skin => "skin",
@@ -102,14 +102,14 @@ pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
         error if error < 0.01 => format!("{} below 0.01 %", row.setting),
         error => format!("{} {error:.2} %", row.setting),
     };
-    let [looked, followed] = [false, true].map(|direct| {
-        let rows = accuracy.of(Study::Lookup).filter(|row| (row.series == Interpolation::Direct.name()) == direct);
+    let [looked, followed] = [false, true].map(|live| {
+        let rows = accuracy.of(Study::Lookup).filter(|row| (row.series == LIVE) == live);
         rows.map(errs).collect::<Vec<_>>().join(", ")
     });
     writeln!(text, "  look-up      `linear` {:.0} ns; errors: {looked}", 1e9 * accuracy.look_up)?;
     writeln!(
         text,
-        "  direct       {:.0} us a solution in contact, by the law at rest; errors, solved {followed}",
+        "  live         {:.0} us a solution in contact, by the law at rest; errors, solved {followed}",
         1e6 * accuracy.solution
     )?;
     let limits = limits(accuracy);
@@ -179,7 +179,7 @@ fn time(accuracy: &Accuracy) -> Canvas {
     let mut sheet = Diagram::new(title, "left: a configuration solved offline; right: a tick of the loop", 1);
     let curves = |study| curves(accuracy, study, |row| (row.cost, row.rms));
     // The energy form at the scene's own tolerance is a dot of the curve of tolerances.
-    let rest = curves(Study::Algorithm).into_iter().filter(|curve| curve.name == Algorithm::Rest.name());
+    let rest = curves(Study::Law).into_iter().filter(|curve| curve.name == ContactLaw::Rest.name());
     let solved = curves(Study::Tolerance).into_iter().chain(rest).collect();
     let left = ("Time of a configuration, over the scene's own [1]".to_owned(), solved);
     let right = ("Time a tick, over linear's look-up [1]".to_owned(), curves(Study::Lookup));

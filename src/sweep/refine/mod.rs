@@ -118,7 +118,7 @@ impl Refine<'_> {
         let [seen, unseen] = judges;
         let exact = self.model.with_contact(tight(self.model.contact, REFERENCE_TOLERANCE));
         let solvers = Solvers::new(&exact, rayon::current_num_threads());
-        let lowest = applies(self.model.contact.algorithm);
+        let lowest = applies(self.model.contact.law);
         let mut filling = self.begin(backend, lowest)?;
         let mut rounds = 0;
         loop {
