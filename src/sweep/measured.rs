@@ -144,7 +144,7 @@ impl ErrorCheck<'_> {
             return None;
         }
         let mut following = self.model.with_contact(ContactSpec { algorithm: Algorithm::Energy, ..contact });
-        following.with_tangent = false;
+        (following.with_tangent, following.with_slip) = (false, false);
         let solvers = Solvers::new(&following, rayon::current_num_threads());
         let solved = solvers.map(&reference.places, |solver, q| solver.solve(q));
         let mut torques = solved.iter().map(|found| found.torque);
@@ -310,7 +310,7 @@ mod tests {
     };
 
     const SHAPE: Shape =
-        Shape { joints: 2, surface_nodes: 0, with_forces: false, with_touches: false, with_tangent: false };
+        Shape { joints: 2, surface_nodes: 0, with_forces: false, with_tangent: false, with_slip: false };
 
     /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
     fn columns(grid: &Grid) -> Columns {
@@ -332,6 +332,7 @@ mod tests {
                         -0.2 * depth * depth * q[1].cos(),
                     ]),
                     forces: Vec::new(),
+                    slip: None,
                     touches: Vec::new(),
                 },
                 SHAPE,

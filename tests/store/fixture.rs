@@ -66,7 +66,7 @@ pub fn nodes(
         if is_there(&node) {
             let numbers: Vec<f32> = record(&space.configuration(level, &node)).iter().map(|&x| x as f32).collect();
             assert_eq!(numbers.len(), width(space.joints()));
-            nodes.push(place, &numbers, 0.25, Status::Contact);
+            nodes.push(place, &numbers, &[], 0.25, Status::Contact);
         }
     }
     nodes
