@@ -135,3 +135,43 @@ fn annihilate(matrix: &mut JointMatrix, vectors: &mut JointMatrix, joints: usize
     }
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// The square of the leading rows, and the greatest entry of a difference.
+    fn square(root: &JointMatrix) -> JointMatrix {
+        root.map(|row| std::array::from_fn(|l| row.iter().zip(root).map(|(a, other)| a * other[l]).sum()))
+    }
+
+    #[test]
+    fn a_square_root_squares_to_its_matrix_whatever_its_rank() {
+        let mut random = Random::new(3);
+        for joints in 1..=MAX_JOINTS {
+            for rank in 1..=joints {
+                for _ in 0..20 {
+                    let mut matrix = JointMatrix::default();
+                    for _ in 0..rank {
+                        let mut vector = JointVector::zeros(joints);
+                        vector.iter_mut().for_each(|entry| *entry = random.between(-1.0, 1.0));
+                        for k in 0..joints {
+                            (0..=k).for_each(|l| add_symmetric(&mut matrix, k, l, vector[k] * vector[l]));
+                        }
+                    }
+                    let root = square_root(&matrix, joints);
+                    let size = matrix.as_flattened().iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+                    let squared = square(&root);
+                    let pairs = squared.as_flattened().iter().zip(matrix.as_flattened());
+                    let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(off < 1e-13 * size.max(1e-3), "{joints} joints, rank {rank}: {off} of {size}");
+                    // Not just any root: it is symmetric, and gives no direction a negative size.
+                    for k in 0..joints {
+                        assert!((0..joints).all(|l| root[k][l] == root[l][k]) && root[k][k] >= 0.0);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -381,6 +381,11 @@ fn hostile_headers() -> Vec<Hostile> {
             "extra does not belong",
         ),
         ("a foreign name", Box::new(|header, _| rename(header, "energy", "zeal")), "zeal does not belong"),
+        (
+            "what friction was felt by before",
+            Box::new(|header, _| rename(header, "iterations", "touch_offsets")),
+            "leave contact_damping out of its scene and bake it again",
+        ),
         ("no torque", Box::new(|header, _| rename(header, "torque", "tau")), "torque is missing"),
         ("contacts without forces", Box::new(|header, _| rename(header, "contact_forces", "f")), "contact_forces"),
         ("another type", Box::new(|header, _| header["energy"]["dtype"] = "I64".into()), "energy has type I64"),
@@ -560,8 +565,8 @@ fn the_text_files_hold_the_same_numbers() {
     let mut lines = text.lines();
     assert_eq!(
         lines.next().unwrap(),
-        "base [rad],\"\"\"s\"\", lide [m]\",torque base [N m],\"force \"\"s\"\", lide [N]\",energy [J],gap [m],\
-         status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside),residual [1],iterations,contacts"
+        "base [rad],\"\"\"s\"\", lide [m]\",torque base [N m],\"force \"\"s\"\", lide [N]\",energy [J],normal_force [N],\
+         gap [m],status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside),residual [1],iterations,contacts"
     );
     let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect();
     assert_eq!(rows.len(), 6);
@@ -570,11 +575,12 @@ fn the_text_files_hold_the_same_numbers() {
         assert_eq!(row[..2], dataset.grid.configuration(point)[..]);
         assert_eq!(row[2..4], *dataset.torque(point));
         assert_eq!(row[4], dataset.energy.as_ref().unwrap()[point]);
-        assert_eq!(row[5] as f32, dataset.gap.as_ref().unwrap()[point]);
-        assert_eq!(row[6], f64::from(dataset.status[point]));
-        assert_eq!(row[7] as f32, dataset.residual.as_ref().unwrap()[point]);
-        assert_eq!(row[8], f64::from(dataset.iterations.as_ref().unwrap()[point]));
-        assert_eq!(row[9], contacts[point]);
+        assert_eq!(row[5] as f32, dataset.slip.as_ref().unwrap().normal_force[point]);
+        assert_eq!(row[6] as f32, dataset.gap.as_ref().unwrap()[point]);
+        assert_eq!(row[7], f64::from(dataset.status[point]));
+        assert_eq!(row[8] as f32, dataset.residual.as_ref().unwrap()[point]);
+        assert_eq!(row[9], f64::from(dataset.iterations.as_ref().unwrap()[point]));
+        assert_eq!(row[10], contacts[point]);
     }
     let text = std::fs::read_to_string(&other).unwrap();
     assert_eq!(text.lines().count(), 6);

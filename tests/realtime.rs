@@ -369,12 +369,7 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     all.four_channel = Some(FourChannelSpec { channels: [0.5, 1.0, 1.0, 0.5], filter: 0.005 });
     all.passivity_control = true;
     let HapticsSpec { friction, four_channel, .. } = all;
-    let none = HapticsSpec {
-        friction: None,
-        four_channel: None,
-        passivity_control: false,
-        ..all.clone()
-    };
+    let none = HapticsSpec { friction: None, four_channel: None, passivity_control: false, ..all.clone() };
     let effects = [
         none.clone(),
         HapticsSpec { friction, ..none.clone() },

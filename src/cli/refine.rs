@@ -58,7 +58,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let most_memory = announce(&refine, &judges[0], each);
     let refined = refine.fill(&mut judges, &mut backend)?;
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
-    let measured = judges[1].measure(&refined.store);
+    let measured = judges[1].measure(&refined.store, &model);
     let error = measured.relative();
     let (kept, file) = (measured.keeps(aim), wanted.output.display());
     let memory = refined.store.bytes();

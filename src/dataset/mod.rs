@@ -23,7 +23,7 @@ mod stored;
 mod summary;
 mod surface;
 
-pub use accuracy::{GeometryError, InterpolationError, MeasuredError};
+pub use accuracy::{FrictionExcess, GeometryError, InterpolationError, MeasuredError};
 pub(crate) use atomic::BUFFER;
 pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
 pub use claim::Claim;

@@ -136,18 +136,10 @@ impl TorqueField {
         let is_potential = dataset.refinement.is_some() || interpolation.is_potential();
         let slip = match (&dataset.refinement, &dataset.slip) {
             (Some(store), _) => store.has_slips().then(|| SlipField::Store(Arc::clone(store))),
-            (None, Some(slip)) => {
-                Some(SlipField::Grid(GridSlips::new(&Checked::new(dataset)?, slip, is_potential)?))
-            }
+            (None, Some(slip)) => Some(SlipField::Grid(GridSlips::new(&Checked::new(dataset)?, slip, is_potential)?)),
             (None, None) => None,
         };
-        Ok(Self {
-            grid,
-            interpolant,
-            slip,
-            has_energy: dataset.energy.is_some(),
-            is_potential,
-        })
+        Ok(Self { grid, interpolant, slip, has_energy: dataset.energy.is_some(), is_potential })
     }
 
     /// Number of joints d.

@@ -113,10 +113,8 @@ impl Accounts {
     #[must_use]
     pub fn residual(&self) -> f64 {
         let given = self.initial + self.absorbed() + self.stop_work;
-        let taken = self.proxy_dissipation
-            + self.coupling_dissipation
-            + self.friction_dissipation
-            + self.control_dissipation;
+        let taken =
+            self.proxy_dissipation + self.coupling_dissipation + self.friction_dissipation + self.control_dissipation;
         given - taken - self.kinetic - self.spring - self.presliding
     }
 

@@ -18,7 +18,10 @@ use crate::{
     field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{BOUNDARY_SLOPE, Diagnostic, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError, THRESHOLD},
+    scene::{
+        BOUNDARY_SLOPE, Diagnostic, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError,
+        THRESHOLD,
+    },
 };
 use std::{collections::BTreeMap, sync::Arc};
 

@@ -252,9 +252,10 @@ mod tests {
 
     #[test]
     fn a_scene_keeps_its_own_values_and_what_is_off_takes_the_usual_one() {
-        let text = sphere()
-            .text
-            .replace("rate = 1000.0 ", "rate = 1000.0\npassivity_control = false\nfriction = { coefficient = 7.5 }\n# ");
+        let text = sphere().text.replace(
+            "rate = 1000.0 ",
+            "rate = 1000.0\npassivity_control = false\nfriction = { coefficient = 7.5 }\n# ",
+        );
         let scene = Scene::parse(&text, "s.toml").unwrap();
         let value = |key: &str| EFFECTS.iter().find(|effect| effect.key == key).unwrap().value(&scene);
         assert_eq!(value("friction").get("coefficient"), Some(&Value::Float(7.5)));

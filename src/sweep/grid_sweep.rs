@@ -18,9 +18,7 @@ use super::{
 };
 use crate::{
     contact::{MeshRipple, Model},
-    dataset::{
-        self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target,
-    },
+    dataset::{self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target},
     memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},

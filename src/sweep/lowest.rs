@@ -331,7 +331,7 @@ mod tests {
             torque: JointVector::from_slice(&[torque]),
             forces: (0..energy as u32).map(force).collect(),
             slip: None,
-                    touches: Vec::new(),
+            touches: Vec::new(),
         }
     }
 

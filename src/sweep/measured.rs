@@ -130,6 +130,7 @@ impl ErrorCheck<'_> {
         });
         let mut error = reference.measured(self.interpolation, errors.collect::<Result<_, FieldError>>()?);
         error.geometry = self.geometry_error(&reference);
+        error.friction = reference.friction_excess(self.model);
         let cells = places.par_iter().map(|place| {
             let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
             (place.q, corners.collect())

@@ -193,7 +193,9 @@ fn friction_takes_what_the_contacts_take_and_between_grid_points_nearly_so() {
     println!("{several} points with several contacts, where friction is up to {most:.3} times the contacts'");
     assert!(several > 20 && most > 1.001, "{several}, {most}");
     let [friction, torque] = errors.map(|[missed, whole]| (missed / whole).sqrt());
-    println!("in the middles of cells of 9 degrees friction errs by {friction:.3} of its rms, the torque by {torque:.3}");
+    println!(
+        "in the middles of cells of 9 degrees friction errs by {friction:.3} of its rms, the torque by {torque:.3}"
+    );
     assert!(friction < torque, "{friction}, {torque}");
 }
 

@@ -78,12 +78,7 @@ fn the_accounts_close_from_the_columns_of_the_file_alone() {
     let columns = Columns::of(&String::from_utf8(csv).unwrap());
 
     let given = ["initial", "coupling work", "channel work", "field work", "stop work"];
-    let taken = [
-        "proxy dissipation",
-        "coupling dissipation",
-        "friction dissipation",
-        "control dissipation",
-    ];
+    let taken = ["proxy dissipation", "coupling dissipation", "friction dissipation", "control dissipation"];
     let kept = ["kinetic", "spring", "presliding"];
     let rounding = ACCOUNT_ROUNDING * columns.get("exchanged [J]").last().unwrap();
     let spent: Vec<f64> = columns.sum(&taken).iter().zip(columns.sum(&kept)).map(|(a, b)| a + b).collect();

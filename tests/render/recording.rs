@@ -82,7 +82,7 @@ fn files_of_a_session_have_the_columns_that_programs_know() {
     let text = String::from_utf8(written).unwrap();
     let (fault, halt) = (Fault::Late, Halt::Stale);
     let start = "3,0.25,5,0.375,7,0.5,9,0.625,11,0.75,13,0.875,0.125,1,7,136";
-    let end = "0,-0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,,0,0,0";
+    let end = "0,-0,0,0,0,0,0,0,0,0,0,0,0,0,0,,0,0,0";
     assert_eq!(text, format!("{TRACE_FILE}0,{start},{fault},1,{halt},{end}\n1.5,{start},,1,{halt},{end}\n"));
 
     let mut written = Vec::new();

@@ -186,7 +186,10 @@ fn a_file_is_the_same_whichever_number_of_threads_put_it_together() {
         assert_eq!(forces, expected.forces.iter().map(|on| (on.node, on.force.as_vec3())).collect::<Vec<_>>());
         let Slip { normal_force, jacobian } = expected.slip.unwrap_or_default();
         let triangle = [jacobian[0][0], jacobian[1][0], jacobian[1][1]].map(|entry| entry as f32);
-        assert_eq!((slips.normal_force[point], &slips.jacobian[3 * point..][..3]), (normal_force as f32, &triangle[..]));
+        assert_eq!(
+            (slips.normal_force[point], &slips.jacobian[3 * point..][..3]),
+            (normal_force as f32, &triangle[..])
+        );
         touched += usize::from(normal_force > 0.0);
     }
     assert!(touched > 4096, "{touched}");
