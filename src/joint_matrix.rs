@@ -86,7 +86,7 @@ pub fn square_root(matrix: &JointMatrix, joints: usize) -> JointMatrix {
         let mut turned = false;
         for k in 0..joints {
             for l in 0..k {
-                turned |= annihilate(&mut diagonal, &mut vectors, joints, [k, l]);
+                turned |= annihilate(&mut diagonal, &mut vectors, [k, l]);
             }
         }
         if !turned {
@@ -107,10 +107,9 @@ pub fn square_root(matrix: &JointMatrix, joints: usize) -> JointMatrix {
 
 /// Turns rows and columns k and l of `matrix` so that entry (k, l) is zero, and `vectors` with them; returns whether it
 /// was more than rounding.
-fn annihilate(matrix: &mut JointMatrix, vectors: &mut JointMatrix, joints: usize, [k, l]: [usize; 2]) -> bool {
-    let off = matrix[k][l];
-    // False for what is not a number.
-    if !(off * off > f64::EPSILON * f64::EPSILON * (matrix[k][k] * matrix[l][l]).abs().max(f64::MIN_POSITIVE)) {
+fn annihilate(matrix: &mut JointMatrix, vectors: &mut JointMatrix, [k, l]: [usize; 2]) -> bool {
+    let (off, beside) = (matrix[k][l], (matrix[k][k] * matrix[l][l]).abs());
+    if off.is_nan() || off * off <= f64::EPSILON * f64::EPSILON * beside.max(f64::MIN_POSITIVE) {
         return false;
     }
     let ratio = (matrix[l][l] - matrix[k][k]) / (2.0 * off);
@@ -118,20 +117,13 @@ fn annihilate(matrix: &mut JointMatrix, vectors: &mut JointMatrix, joints: usize
     let cosine = 1.0 / tangent.hypot(1.0);
     let sine = tangent * cosine;
     let turn = |a: &mut f64, b: &mut f64| (*a, *b) = (cosine * *a - sine * *b, sine * *a + cosine * *b);
-    for row in matrix.iter_mut().take(joints) {
-        let (mut a, mut b) = (row[k], row[l]);
-        turn(&mut a, &mut b);
-        (row[k], row[l]) = (a, b);
+    for row in matrix.iter_mut().chain(vectors) {
+        if let Ok([a, b]) = row.get_disjoint_mut([k, l]) {
+            turn(a, b);
+        }
     }
-    for column in 0..joints {
-        let (mut a, mut b) = (matrix[k][column], matrix[l][column]);
-        turn(&mut a, &mut b);
-        (matrix[k][column], matrix[l][column]) = (a, b);
-    }
-    for row in vectors.iter_mut().take(joints) {
-        let (mut a, mut b) = (row[k], row[l]);
-        turn(&mut a, &mut b);
-        (row[k], row[l]) = (a, b);
+    if let Ok([a, b]) = matrix.get_disjoint_mut([k, l]) {
+        a.iter_mut().zip(b).for_each(|(a, b)| turn(a, b));
     }
     true
 }
@@ -167,8 +159,8 @@ mod tests {
                     let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                     assert!(off < 1e-13 * size.max(1e-3), "{joints} joints, rank {rank}: {off} of {size}");
                     // Not just any root: it is symmetric, and gives no direction a negative size.
-                    for k in 0..joints {
-                        assert!((0..joints).all(|l| root[k][l] == root[l][k]) && root[k][k] >= 0.0);
+                    for (k, row) in root.iter().enumerate() {
+                        assert!((0..joints).all(|l| row[l] == root[l][k]) && row[k] >= 0.0);
                     }
                 }
             }
