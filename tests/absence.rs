@@ -120,8 +120,8 @@ fn a_dataset_holds_what_its_effects_need_and_all_else_is_the_same_bits() {
     for effect in EFFECTS {
         let named = with(false, &[effect]);
         let mut fields = if effect.is_drawn() { graphics.fields() } else { plain.fields() };
-        if effect.is_at_contacts() {
-            fields.extend(["touch_forces", "touch_nodes", "touch_offsets"].map(str::to_owned));
+        if effect.key == "friction" {
+            fields.extend(["normal_force", "slip_jacobian"].map(str::to_owned));
         }
         assert_eq!(named.fields(), fields, "{}", effect.key);
         assert!(named.columns() == plain.columns(), "{}", effect.key);
@@ -331,13 +331,14 @@ fn an_effect_that_cannot_act_is_an_error_that_says_so() {
     // A virtual one whose dataset was gridized from measurements, or has lost its contact forces.
     let without_forces = |effect: Effect| {
         let mut baked = with(true, &[effect]);
-        (baked.data.contacts, baked.data.touches) = (None, None);
+        (baked.data.contacts, baked.data.slip) = (None, None);
         Setup::new(&baked.data).err().map(|error| error.to_string())
     };
     for effect in EFFECTS {
         let told = without_forces(effect);
-        match (effect.needs_forces(), &told) {
-            (true, Some(told)) => assert!(told.contains(effect.key) && told.contains("contact forces"), "{told}"),
+        let lacks = if effect.is_drawn() { "contact forces" } else { "how contacts slip" };
+        match (effect.is_stored(), &told) {
+            (true, Some(told)) => assert!(told.contains(effect.key) && told.contains(lacks), "{told}"),
             (needs, _) => assert!(!needs && told.is_none(), "{}: {told:?}", effect.key),
         }
         if effect.is_drawn() {

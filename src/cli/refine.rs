@@ -43,6 +43,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     model.with_tangent = true;
+    model.with_slip = scene.haptics.friction.is_some();
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
@@ -57,7 +58,7 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let most_memory = announce(&refine, &judges[0], each);
     let refined = refine.fill(&mut judges, &mut backend)?;
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
-    let measured = judges[1].measure(&refined.store);
+    let measured = judges[1].measure(&refined.store, &model);
     let error = measured.relative();
     let (kept, file) = (measured.keeps(aim), wanted.output.display());
     let memory = refined.store.bytes();
@@ -104,7 +105,7 @@ fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
         refine.base.points()
     ));
     let most = uniform.min(refine.most);
-    let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most);
+    let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most, refine.model.with_slip);
     let time = each.map_or(String::new(), |each| format!("{:.0} s to solve, ", (each * most as f64).ceil()));
     tell(format_args!(
         "haptize: that is at most {most} nodes, which would take about {time}{} of memory, {} more while they are \

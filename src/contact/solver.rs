@@ -7,7 +7,7 @@ use super::equilibrium::rest::{Guess, RestProgram};
 use super::linear::support::dot;
 use super::model::Model;
 use super::reach;
-use super::{Equilibrium, NodeForce, Status, Touch};
+use super::{Equilibrium, NodeForce, Slip, Status, Touch};
 use crate::contact::MINIMUM_SQUARE;
 use crate::proxy::Pose;
 use crate::scene::ContactLaw;
@@ -122,6 +122,7 @@ impl<'a> Solver<'a> {
         equilibrium.residual = outcome.residual;
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
         self.account(&mut equilibrium);
+        equilibrium.slip = model.with_slip.then(|| Slip::of(model.chain, q, equilibrium.on_proxy()));
         if model.with_tangent && outcome.converged {
             equilibrium.tangent = match self.held_by {
                 HeldBy::Energy => self.energy.tangent(model, &self.pose),

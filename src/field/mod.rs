@@ -23,6 +23,7 @@ mod linear;
 mod points;
 mod potential;
 pub mod range;
+mod slip;
 mod slope;
 mod stiffness;
 mod work;
@@ -35,7 +36,7 @@ pub(crate) use slope::GRADIENT_STEP;
 
 use crate::{
     JointVector,
-    contact::Status,
+    contact::{Slip, Status},
     dataset::{Dataset, Grid},
     scene::Interpolation,
 };
@@ -43,12 +44,15 @@ use grid_root::GridRoot;
 use linear::Linear;
 use points::Checked;
 use potential::Potential;
+use slip::{GridSlips, SlipField};
 use std::sync::Arc;
 
 /// The contact torque around one object.
 pub struct TorqueField {
     grid: Grid,
     interpolant: Box<dyn Interpolant>,
+    /// Absent where the dataset says nothing of it.
+    slip: Option<SlipField>,
     has_energy: bool,
     is_potential: bool,
 }
@@ -126,12 +130,13 @@ impl TorqueField {
             (None, Interpolation::Linear) => Box::new(Linear::new(Checked::new(dataset)?, threshold, slope)?),
             (None, Interpolation::Potential) => Box::new(GridRoot::potential(Checked::new(dataset)?)?),
         };
-        Ok(Self {
-            grid,
-            interpolant,
-            has_energy: dataset.energy.is_some(),
-            is_potential: dataset.refinement.is_some() || interpolation.is_potential(),
-        })
+        let is_potential = dataset.refinement.is_some() || interpolation.is_potential();
+        let slip = match (&dataset.refinement, &dataset.slip) {
+            (Some(store), _) => store.has_slips().then(|| SlipField::Store(Arc::clone(store))),
+            (None, Some(slip)) => Some(SlipField::Grid(GridSlips::new(&Checked::new(dataset)?, slip, is_potential)?)),
+            (None, None) => None,
+        };
+        Ok(Self { grid, interpolant, slip, has_energy: dataset.energy.is_some(), is_potential })
     }
 
     /// Number of joints d.
@@ -150,6 +155,20 @@ impl TorqueField {
     #[must_use]
     pub fn has_energy(&self) -> bool {
         self.has_energy
+    }
+
+    /// Whether it is known how contacts slip.
+    #[must_use]
+    pub fn has_slip(&self) -> bool {
+        self.slip.is_some()
+    }
+
+    /// How the contacts slip at `q`, of which `sample` is the field; none out of contact, or where that is not known.
+    /// Never allocates.
+    #[must_use]
+    pub fn slip(&self, q: &[f64], sample: &Sample) -> Slip {
+        let Some(slip) = self.slip.as_ref().filter(|_| sample.contact) else { return Slip::default() };
+        slip.at(q, if self.is_potential { self.grid.fade(q) * (2.0 * sample.energy).sqrt() } else { sample.share })
     }
 
     /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid.

@@ -56,9 +56,9 @@ pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result
         return Err(checker.error(0..0, message));
     };
     let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, &mut table)?;
-    if let Some(effect) = haptics.at_contacts() {
-        let message = format!("{effect} needs the contact forces, which a real object does not tell: leave it out");
-        return Err(checker.at(&format!("haptics.{effect}"), message));
+    if haptics.friction.is_some() {
+        let message = "friction needs to know how contacts slip, which a real object does not tell: leave it out";
+        return Err(checker.at("haptics.friction", message));
     }
     Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }

@@ -5,7 +5,7 @@
 
 use super::check::Checker;
 use super::gains::{GAINS, OF_THE_DEVICE, OF_THE_HAND};
-use super::value::{KEY, Range, defaults, gains, not_negative, positive, positive_gains, share};
+use super::value::{KEY, Range, defaults, gains, positive, positive_gains, share};
 use super::{JointSpec, SceneError};
 use crate::JointVector;
 use serde::Deserialize;
@@ -78,11 +78,8 @@ pub struct HapticsSpec {
     /// Dry friction of each joint of the device; zero if not given (N m).
     #[serde(deserialize_with = "gains")]
     pub device_friction: JointVector,
-    /// Friction between the proxy and the object, where the scene names it, as each of the three effects below.
+    /// Friction between the proxy and the object, where the scene names it, as each of the two effects below.
     pub friction: Option<FrictionSpec>,
-    /// Dampers along the normals of the contacts: c of one contact (N s/m).
-    #[serde(deserialize_with = "positive")]
-    pub contact_damping: Option<f64>,
     /// Force channels beside the spring and damper of the virtual coupling.
     pub four_channel: Option<FourChannelSpec>,
     /// Whether a passivity controller acts when the passivity observer is negative.
@@ -91,7 +88,7 @@ pub struct HapticsSpec {
     pub hand: HandSpec,
 }
 
-/// Coulomb friction of elastic-plastic bristles, one at each proxy node in contact.
+/// Coulomb friction of an elastic-plastic spring between proxy and object.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionSpec {
@@ -101,12 +98,9 @@ pub struct FrictionSpec {
     /// Tangential over normal force at which sticking ends; at least `coefficient`, which it is where it is `None` (1).
     #[serde(deserialize_with = "positive", default)]
     pub static_coefficient: Option<f64>,
-    /// Stiffness of a bristle: how fast friction builds up while sticking (N/m).
-    #[serde(deserialize_with = "positive", default = "bristle_stiffness")]
+    /// Stiffness of the spring: how fast friction builds up while sticking (N/m).
+    #[serde(deserialize_with = "positive", default = "sticking_stiffness")]
     pub stiffness: f64,
-    /// Damping of a bristle while sticking (N s/m).
-    #[serde(deserialize_with = "not_negative", default = "bristle_damping")]
-    pub damping: f64,
 }
 
 /// Four-channel coupling (Lawrence 1993).
@@ -187,11 +181,9 @@ const CHANNELS: [f64; 4] = [0.5, 1.0, 1.0, 0.5];
 const CHANNEL_FILTER: f64 = 0.005;
 
 defaults! {
-    /// Default stiffness of a bristle (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for
+    /// Default stiffness of friction (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for
     /// a slip.
-    bristle_stiffness: f64 = 500.0;
-    /// Default damping of a bristle (N s/m).
-    bristle_damping: f64 = 1.0;
+    sticking_stiffness: f64 = 500.0;
 }
 
 impl Default for HapticsSpec {
@@ -217,7 +209,6 @@ impl Default for HapticsSpec {
             encoder_step: unset,
             device_friction: unset,
             friction: None,
-            contact_damping: None,
             four_channel: None,
             passivity_control: false,
             hand: HandSpec::default(),
@@ -232,13 +223,6 @@ impl Default for FourChannelSpec {
 }
 
 impl HapticsSpec {
-    /// The key of the first effect that acts at contacts, and so needs their forces.
-    #[must_use]
-    pub fn at_contacts(&self) -> Option<&'static str> {
-        let friction = self.friction.map(|_| "friction");
-        friction.or(self.contact_damping.map(|_| "contact_damping"))
-    }
-
     /// Fits it to the arm's `joints`, and checks it.
     pub(super) fn check(&mut self, checker: &Checker<'_>, joints: &[JointSpec]) -> Result<(), SceneError> {
         self.proxy_damping_is_free = self.proxy_damping.is_empty();

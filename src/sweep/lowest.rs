@@ -316,7 +316,7 @@ mod tests {
     use crate::{dataset::Stored, field::synthetic, sweep::table::Block};
 
     const SHAPE: Shape =
-        Shape { joints: 1, surface_nodes: 9, with_forces: true, with_touches: false, with_tangent: false };
+        Shape { joints: 1, surface_nodes: 9, with_forces: true, with_tangent: false, with_slip: false };
 
     /// An equilibrium in contact with as many node forces as its energy has joules.
     fn equilibrium(energy: f64, torque: f64) -> Equilibrium {
@@ -330,6 +330,7 @@ mod tests {
             tangent: None,
             torque: JointVector::from_slice(&[torque]),
             forces: (0..energy as u32).map(force).collect(),
+            slip: None,
             touches: Vec::new(),
         }
     }

@@ -80,7 +80,7 @@ fn compare(cpu: &[Equilibrium], gpu: &[Equilibrium], nodes: usize) -> Result<Off
         }
         off.tangent = off.tangent.max(difference(&entries(cpu), &entries(gpu)));
         size.tangent = size.tangent.max(greatest(&entries(cpu)));
-        let pushed = [cpu, gpu].map(|it| it.on_proxy().into_iter().map(|touch| touch.force).sum::<DVec3>());
+        let pushed = [cpu, gpu].map(|it| it.on_proxy().map(|(_, force)| force).sum::<DVec3>());
         off.force = off.force.max(pushed[0].distance(pushed[1]));
     }
     let over = |off: f64, size: f64| if size > 0.0 { off / size } else { off };

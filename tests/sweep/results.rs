@@ -4,7 +4,7 @@ use crate::fixture::{Folder, MadeUp, POINTS, SCENE, answer, bake, scene, sweep, 
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, NodeForce, Solver, Status, Touch},
+    contact::{Equilibrium, Model, NodeForce, Slip, Solver, Status},
     dataset::Dataset,
     fixtures::Random,
     object::Object,
@@ -159,8 +159,9 @@ fn a_file_is_the_same_whichever_number_of_threads_put_it_together() {
     let sweep = sweep_of(&scene, "none", "");
     let touching = |q: &[f64]| {
         let equilibrium = answer(q);
-        let touch = |on: &NodeForce| Touch { proxy_node: on.node, carriers: Vec::new(), force: on.force };
-        Equilibrium { touches: equilibrium.forces.iter().rev().skip(1).rev().map(touch).collect(), ..equilibrium }
+        let mut slip = Slip { normal_force: 1.0 + q[0], ..Slip::default() };
+        (slip.jacobian[0][0], slip.jacobian[1][0], slip.jacobian[1][1]) = (q[0], q[1], q[0] * q[1]);
+        Equilibrium { slip: equilibrium.status.is_in_contact().then_some(slip), ..equilibrium }
     };
     let put_together = |threads| {
         let folder = Folder::new();
@@ -176,17 +177,22 @@ fn a_file_is_the_same_whichever_number_of_threads_put_it_together() {
     let folder = Folder::new();
     std::fs::write(folder.output(), one).unwrap();
     let dataset = Dataset::open(&folder.output()).unwrap();
-    let touches = dataset.touches.as_ref().unwrap();
-    let mut end = 0;
+    let slips = dataset.slip.as_ref().unwrap();
+    let mut touched = 0;
     for point in 0..dataset.grid.points() {
         let expected = touching(&dataset.grid.configuration(point));
         assert_eq!(dataset.torque(point), &expected.torque[..]);
         let forces: Vec<_> = dataset.forces(point).map(|on| (on.node, on.force.as_vec3())).collect();
         assert_eq!(forces, expected.forces.iter().map(|on| (on.node, on.force.as_vec3())).collect::<Vec<_>>());
-        end += expected.touches.len();
-        assert_eq!(touches.offsets[point + 1], end as u64);
+        let Slip { normal_force, jacobian } = expected.slip.unwrap_or_default();
+        let triangle = [jacobian[0][0], jacobian[1][0], jacobian[1][1]].map(|entry| entry as f32);
+        assert_eq!(
+            (slips.normal_force[point], &slips.jacobian[3 * point..][..3]),
+            (normal_force as f32, &triangle[..])
+        );
+        touched += usize::from(normal_force > 0.0);
     }
-    assert!(end > 4096 && end == touches.nodes.len(), "{end}");
+    assert!(touched > 4096, "{touched}");
 }
 
 /// Skipping changes nothing but gaps far from contact, and those are then lower bounds.
