@@ -8,6 +8,7 @@
 mod attachment;
 mod body;
 mod compliance;
+mod condensation;
 mod crossing;
 mod element;
 mod error;
