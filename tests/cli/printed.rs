@@ -155,7 +155,10 @@ fn without_numbers(text: &str) -> String {
         let is_part = |(at, c): (usize, char)| {
             let exponent = number[..at].ends_with('e') && c == '-';
             let begins = c == 'e' && number[at + 1..].starts_with(|c: char| c == '-' || c.is_ascii_digit());
-            c.is_ascii_digit() || c == '.' && number[at + 1..].starts_with(|c: char| c.is_ascii_digit()) || exponent || begins
+            c.is_ascii_digit()
+                || c == '.' && number[at + 1..].starts_with(|c: char| c.is_ascii_digit())
+                || exponent
+                || begins
         };
         let end = number.char_indices().find(|at| !is_part(*at)).map_or(number.len(), |(at, _)| at);
         masked.push('#');
