@@ -131,7 +131,7 @@ impl Equilibrium {
 }
 
 /// Contact force f_j on one node of the object.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct NodeForce {
     /// Number of the object's node.
     pub node: u32,

@@ -19,7 +19,7 @@ use std::time::Instant;
 const SPEED: f64 = 0.2;
 
 /// Name of its series.
-pub(super) const LIVE: &str = "live";
+pub const LIVE: &str = "live";
 
 /// Seed of the directions.
 const SEED: u64 = 24;

@@ -16,7 +16,8 @@ mod report;
 mod settings;
 
 pub use choice::{Limit, Offer, limits, offers};
-pub use report::{FILES, describe, write_all};
+pub use live::LIVE;
+pub use report::{FILES, write_all};
 
 use crate::{
     contact::Model,

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod docs;
+mod printed;
 
 use serde_json::Value;
 use std::{
