@@ -26,8 +26,8 @@ use haptize::{
         setup::{Setup, labels},
     },
     scene::{
-        FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticsSpec, Interpolation, ProxyInertia, Scene,
-        Waypoint,
+        FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticsSpec, Interpolation, ProxyInertia,
+        RelaxationSpec, Scene, Waypoint,
     },
     sweep::baked,
 };
@@ -348,6 +348,11 @@ fn rubbing(gains: &mut HapticsSpec) {
     gains.friction = Some(FrictionSpec { coefficient: 0.3, static_coefficient: Some(0.4), stiffness: 500.0 });
 }
 
+/// Memory as the tests feel it, forgetting as the arm slides.
+fn relaxing() -> Option<RelaxationSpec> {
+    Some(RelaxationSpec { terms: vec![[0.5, 0.05], [0.2, 0.5]], dent: Some(0.01) })
+}
+
 /// The sphere over every third line of its grid, a little less than the joints can reach, with what friction
 /// needs.
 fn sphere() -> Dataset {
@@ -373,6 +378,8 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     let effects = [
         none.clone(),
         HapticsSpec { friction, ..none.clone() },
+        HapticsSpec { relaxation: relaxing(), ..none.clone() },
+        HapticsSpec { friction, relaxation: relaxing(), ..none.clone() },
         HapticsSpec { four_channel, ..none.clone() },
         HapticsSpec { passivity_control: true, ..none },
         all,
@@ -381,7 +388,8 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     for interpolation in Interpolation::ALL {
         for inertia in [ProxyInertia::Constant, ProxyInertia::Configuration] {
             for effects in &effects {
-                let gains = HapticsSpec { interpolation, proxy_inertia: inertia, ..effects.clone() };
+                let relaxation = effects.relaxation.clone().filter(|_| interpolation.is_potential());
+                let gains = HapticsSpec { interpolation, proxy_inertia: inertia, relaxation, ..effects.clone() };
                 let (haptics, _) = setup.retuned(&data, &gains).unwrap();
                 let mut state = haptics.start(&setup.scene.motion.press[0].q).unwrap();
                 let mut before = setup.scene.motion.press[0].q;

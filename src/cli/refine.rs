@@ -113,7 +113,7 @@ pub fn run(
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     model.with_tangent = true;
-    model.with_slip = scene.haptics.friction.is_some();
+    model.with_slip = scene.haptics.uses_slip();
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;

@@ -64,11 +64,28 @@ impl Slip {
         slip
     }
 
+    /// Returns |B qdot| of joint rates `rates`, the slip rate (m/s).
+    #[must_use]
+    pub fn rate(&self, rates: &[f64]) -> f64 {
+        let rows = self.jacobian.iter().take(rates.len());
+        rows.map(|row| row.iter().zip(rates).map(|(b, rate)| b * rate).sum::<f64>().powi(2)).sum::<f64>().sqrt()
+    }
+
     /// Returns N |B qdot| of joint rates `rates`: what friction of coefficient one takes at most (W).
     #[must_use]
     pub fn dissipation(&self, rates: &[f64]) -> f64 {
-        let rows = self.jacobian.iter().map(|row| row.iter().zip(rates).map(|(b, rate)| b * rate).sum::<f64>());
-        self.normal_force * rows.map(|slip| slip * slip).sum::<f64>().sqrt()
+        self.normal_force * self.rate(rates)
+    }
+
+    /// Adds to `damping` that of a `damper` against slip (N s/m), `damper B B^T`, over the first `joints` joints.
+    pub fn add_damper(&self, damper: f64, damping: &mut JointMatrix, joints: usize) {
+        for k in 0..joints {
+            for l in 0..=k {
+                // B is symmetric.
+                let square = self.jacobian[k][..joints].iter().zip(&self.jacobian[l]).map(|(x, y)| x * y).sum::<f64>();
+                add_symmetric(damping, k, l, damper * square);
+            }
+        }
     }
 
     /// Whether all numbers are finite.

@@ -168,7 +168,8 @@ impl TorqueField {
     #[must_use]
     pub fn slip(&self, q: &[f64], sample: &Sample) -> Slip {
         let Some(slip) = self.slip.as_ref().filter(|_| sample.contact) else { return Slip::default() };
-        slip.at(q, if self.is_potential { self.grid.fade(q) * (2.0 * sample.energy).sqrt() } else { sample.share })
+        let fade = if sample.flags.contains(Flags::OUTSIDE) { self.grid.fade(q) } else { 1.0 };
+        slip.at(q, if self.is_potential { fade * (2.0 * sample.energy).sqrt() } else { sample.share })
     }
 
     /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid.

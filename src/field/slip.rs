@@ -13,10 +13,11 @@ use super::{
 use crate::{
     contact::Slip,
     dataset::{Grid, SlipColumns},
-    joint_matrix::{add_symmetric, entries},
+    joint_matrix::entries,
     store::{
-        Cell, Gathered, Levels, Place, Store, linear,
+        Cell, Store,
         record::{MAX_WIDTH, width},
+        with_joints,
     },
 };
 use std::sync::Arc;
@@ -30,14 +31,18 @@ pub(super) enum SlipField {
 impl SlipField {
     /// The slip at `q`, where normal forces are those of the nodes times `scale`. Never allocates.
     pub fn at(&self, q: &[f64], scale: f64) -> Slip {
-        let numbers: [f64; MAX_WIDTH] = match self {
-            Self::Grid(slips) => linear(slips, Cell::of(&slips.grid, q)),
+        let numbers = match self {
+            Self::Grid(slips) => with_joints!(q.len(), D => slips.at::<{ 1 << D }, { width(D) }>(q)),
             Self::Store(store) => store.slip(q),
         };
         let [ratio, triangle @ ..] = numbers;
         let mut slip = Slip { normal_force: scale * ratio.max(0.0), ..Slip::default() };
-        let places = (0..q.len()).flat_map(|k| (0..=k).map(move |l| (k, l)));
-        places.zip(triangle).for_each(|((k, l), entry)| add_symmetric(&mut slip.jacobian, k, l, entry));
+        for k in 0..q.len() {
+            for l in 0..=k {
+                let entry = triangle[k * (k + 1) / 2 + l];
+                (slip.jacobian[k][l], slip.jacobian[l][k]) = (entry, entry);
+            }
+        }
         slip
     }
 }
@@ -82,22 +87,17 @@ impl GridSlips {
         }
         Ok(Self { grid: grid.clone(), records })
     }
-}
 
-impl Levels for GridSlips {
-    fn base(&self) -> &Grid {
-        &self.grid
-    }
-
-    fn count(&self) -> u32 {
-        1
-    }
-
-    fn gather<const C: usize, const W: usize>(&self, _: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
-        for (corner, point) in corners::<C>(&self.grid, low).into_iter().enumerate() {
+    /// The numbers at `q`, multilinear over the `C` corners of its cell, `W` of each.
+    fn at<const C: usize, const W: usize>(&self, q: &[f64]) -> [f64; MAX_WIDTH] {
+        let cell = Cell::of(&self.grid, q);
+        let mut sums = [0.0; W];
+        for (point, weight) in corners::<C>(&self.grid, &cell.low).into_iter().zip(cell.weights::<C>()) {
             let record = &self.records[point * W..(point + 1) * W];
-            numbers.iter_mut().zip(record).for_each(|(number, entry)| number[corner] = f64::from(*entry));
+            sums.iter_mut().zip(record).for_each(|(sum, number)| *sum += weight * f64::from(*number));
         }
-        Gathered { found: true, whole: true, any: true, failed: false }
+        let mut numbers = [0.0; MAX_WIDTH];
+        numbers[..W].copy_from_slice(&sums);
+        numbers
     }
 }

@@ -51,12 +51,15 @@ pub struct Accounts {
     pub friction_dissipation: f64,
     /// Taken by the passivity controller at the object's port.
     pub control_dissipation: f64,
-    /// Energy U stored in the object, interpolated; zero for datasets without it.
+    /// Energy stored in the object: U, interpolated, or what is left of it where the object relaxes; zero for datasets
+    /// without it.
     pub stored: f64,
+    /// Lost in the object where it relaxes, and taken by the drag of fresh material.
+    pub relaxed: f64,
     /// Energy stored in the object at the first tick. If the dataset does not hold it: zero if the loop began out of
     /// contact; else nothing is known until contact first ends, and what was given by then is taken for it.
     pub first_stored: Option<f64>,
-    /// Energy that the contact torque gave beyond what the object had stored, field_work + U - U_0: made by the time
+    /// Energy that the contact torque gave beyond what the object had stored, field_work + stored + relaxed - first: made by the time
     /// step, and by interpolation unless that has a potential; zero for datasets without energy.
     pub leak: f64,
     /// Energy that the device's port took in: minus the sum of (torque on the device) . (device displacement).
@@ -78,6 +81,8 @@ pub(super) struct Extra {
     pub friction_work: f64,
     /// Energy that friction keeps after the step (J).
     pub presliding: f64,
+    /// Taken by the drag of fresh material, a part of the contact torque (J).
+    pub drag: f64,
     /// Taken by the passivity controller (J).
     pub control_dissipation: f64,
 }
@@ -85,7 +90,7 @@ pub(super) struct Extra {
 impl Accounts {
     /// Every account by its name, in the order of their balance, and what it leaves; none where it is not known (J).
     #[must_use]
-    pub fn named(&self) -> [(&'static str, Option<f64>); 19] {
+    pub fn named(&self) -> [(&'static str, Option<f64>); 20] {
         [
             ("initial", Some(self.initial)),
             ("kinetic", Some(self.kinetic)),
@@ -102,6 +107,7 @@ impl Accounts {
             ("residual", Some(self.residual())),
             ("exchanged", Some(self.exchanged)),
             ("stored", Some(self.stored)),
+            ("relaxed", Some(self.relaxed)),
             ("first stored", self.first_stored),
             ("leak", Some(self.leak)),
             ("port work", Some(self.port_work)),
@@ -145,7 +151,7 @@ impl Accounts {
     /// more than the object can have had.
     #[must_use]
     pub fn created(&self) -> f64 {
-        self.first_stored.map_or(0.0, |first| self.field_work + self.stored - first)
+        self.first_stored.map_or(0.0, |first| self.field_work + self.stored + self.relaxed - first)
     }
 
     /// Returns what damping, friction, stops and controller have taken from the proxy (J).
@@ -154,11 +160,13 @@ impl Accounts {
         self.proxy_dissipation + self.friction_dissipation + self.control_dissipation - self.stop_work
     }
 
-    /// Books the state at a tick: what the object has stored, if the dataset holds it, and whether it is touched.
-    pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, stored: Option<f64>, touched: bool) {
+    /// Books the state at a tick: what the object has stored, if the dataset holds it, and has lost since the tick before;
+    /// and whether it is touched.
+    pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, (stored, relaxed): (Option<f64>, f64), touched: bool) {
         self.kinetic = kinetic;
         self.spring = spring;
         self.stored = stored.unwrap_or(0.0);
+        self.relaxed += relaxed;
         if self.first_stored.is_none() {
             self.first_stored = stored.or((!touched).then_some(self.field_work.max(0.0)));
         }
@@ -212,10 +220,11 @@ impl Accounts {
             self.channel_work += channel;
             self.exchanged += damper.abs() + heat + drag + field.abs() + channel.abs();
         }
+        self.field_work -= extra.drag;
         self.stop_work += step.stop_work;
         self.friction_dissipation += self.presliding - extra.presliding - extra.friction_work;
         self.presliding = extra.presliding;
         self.control_dissipation += extra.control_dissipation;
-        self.exchanged += step.stop_work.abs() + extra.friction_work.abs() + extra.control_dissipation;
+        self.exchanged += step.stop_work.abs() + extra.friction_work.abs() + extra.drag + extra.control_dissipation;
     }
 }

@@ -24,7 +24,7 @@ use super::{
     accounts::Extra,
     npmi::{Load, MidpointInertia, Motion, Npmi, Step},
 };
-use crate::{JointMatrix, JointVector, contact::Slip, scene::FrictionSpec};
+use crate::{JointVector, contact::Slip, scene::FrictionSpec};
 
 /// The constants of friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,57 +85,54 @@ impl Friction {
         motion: &mut Motion,
         extra: &mut Extra,
     ) -> Step {
-        let Pending { npmi, stage, interval, velocity, load } = pending;
+        let &Pending { npmi, stage, interval, velocity, ref load } = pending;
         let reach = |coefficient| coefficient * slip.normal_force / self.stiffness;
         let sticking = reach(if state.slid { self.kinetic } else { self.stiction });
         let mut start = shortened(&state.deflection, sticking);
         if slip.normal_force <= 0.0 {
             *state = FrictionState { deflection: start, slid: false };
-            return npmi.advance(stage, motion, *interval, load);
+            return npmi.advance(stage, motion, interval, load);
         }
         let mut alpha = 1.0;
-        if moved(&start, slip, *interval, velocity).norm() > sticking {
-            start = shortened(&start, reach(self.kinetic));
-            alpha = (reach(self.kinetic) / moved(&start, slip, *interval, velocity).norm()).min(1.0);
+        let predicted = moved(&start, slip, interval, &velocity);
+        if predicted.dot(&predicted) > sticking * sticking {
+            let kinetic = reach(self.kinetic);
+            start = shortened(&start, kinetic);
+            alpha = (kinetic / moved(&start, slip, interval, &velocity).norm()).min(1.0);
         }
-        let solve = |alpha: f64| {
-            let mut trial = *motion;
-            let step = npmi.advance(stage, &mut trial, *interval, &self.loaded(pending, slip, &start, alpha));
-            let end = moved(&start, slip, *interval, &step.velocity);
+        let before = *motion;
+        let solve = |alpha: f64, motion: &mut Motion| {
+            let step = npmi.advance(stage, motion, interval, &self.loaded(load, slip, &start, alpha, interval));
+            let end = moved(&start, slip, interval, &step.velocity);
             let mut kept = end;
             kept.iter_mut().for_each(|z| *z *= alpha);
-            (trial, step, end, kept)
+            (step, end, kept)
         };
-        let mut solved = solve(alpha);
-        if alpha < 1.0 && start.dot(&solved.3) + solved.3.dot(&solved.3) < 0.0 {
+        let (mut step, mut end, mut kept) = solve(alpha, motion);
+        if alpha < 1.0 && start.dot(&kept) + kept.dot(&kept) < 0.0 {
             alpha = 1.0;
-            solved = solve(alpha);
+            *motion = before;
+            (step, end, kept) = solve(alpha, motion);
         }
-        let (end_of_step, step, end, kept) = solved;
-        *motion = end_of_step;
         let works = (0..start.len()).map(|a| (start[a] + kept[a]) * (end[a] - start[a]));
         extra.friction_work = -0.5 * self.stiffness * works.sum::<f64>();
-        let slid = alpha < 1.0 || kept.norm() > sticking;
-        let deflection = shortened(&kept, if slid { reach(self.kinetic) } else { sticking });
-        extra.presliding = 0.5 * self.stiffness * deflection.dot(&deflection);
-        *state = FrictionState { deflection, slid };
+        let slid = alpha < 1.0 || kept.dot(&kept) > sticking * sticking;
+        if slid {
+            kept = shortened(&kept, reach(self.kinetic));
+        }
+        extra.presliding = 0.5 * self.stiffness * kept.dot(&kept);
+        *state = FrictionState { deflection: kept, slid };
         step
     }
 
     /// The load of the step and friction, whose deflection goes from `start` z to `alpha` z*:
     /// `tau = -k/2 B ((1 + alpha) z + alpha B T v_hat)`.
-    fn loaded(&self, pending: &Pending<'_>, slip: &Slip, start: &JointVector, alpha: f64) -> Load {
-        let mut load = pending.load;
-        let joints = start.len();
-        let damping = 0.5 * self.stiffness * pending.interval * alpha;
+    fn loaded(&self, load: &Load, slip: &Slip, start: &JointVector, alpha: f64, interval: f64) -> Load {
+        let mut load = *load;
+        slip.add_damper(0.5 * self.stiffness * interval * alpha, &mut load.damping, start.len());
         let force = 0.5 * self.stiffness * (1.0 + alpha);
-        for a in 0..joints {
-            load.torque[a] -= force * product(&slip.jacobian, a, start);
-            for b in 0..joints {
-                // B is symmetric.
-                let square: f64 = slip.jacobian[a].iter().zip(&slip.jacobian[b]).map(|(x, y)| x * y).sum();
-                load.damping[a][b] += damping * square;
-            }
+        for (torque, row) in load.torque.iter_mut().zip(&slip.jacobian) {
+            *torque -= force * start.dot(row);
         }
         load
     }
@@ -144,20 +141,16 @@ impl Friction {
 /// z + B T v (m).
 fn moved(start: &JointVector, slip: &Slip, interval: f64, velocity: &JointVector) -> JointVector {
     let mut end = *start;
-    end.iter_mut().enumerate().for_each(|(a, z)| *z += interval * product(&slip.jacobian, a, velocity));
+    end.iter_mut().zip(&slip.jacobian).for_each(|(z, row)| *z += interval * velocity.dot(row));
     end
-}
-
-/// Row `a` of `matrix` times `vector`.
-fn product(matrix: &JointMatrix, a: usize, vector: &JointVector) -> f64 {
-    vector.dot(&matrix[a])
 }
 
 /// `deflection`, no longer than `greatest`.
 fn shortened(deflection: &JointVector, greatest: f64) -> JointVector {
     let mut shorter = *deflection;
-    let length = deflection.norm();
-    if length > greatest {
+    let square = deflection.dot(deflection);
+    if square > greatest * greatest {
+        let length = square.sqrt();
         shorter.iter_mut().for_each(|z| *z *= greatest / length);
     }
     shorter

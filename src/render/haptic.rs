@@ -8,7 +8,7 @@
 //! [`Haptics::restart`]. So it is when the passivity observer of the device's port finds that the hand has been given
 //! energy from nowhere ([`Fault::Energy`]).
 //!
-//! What the scene may name beside (channels, controller, friction) is decided once, in [`Haptics::new`]; what it does not name has no state and does no work.
+//! What the scene may name beside (channels, controller, friction, relaxation) is decided once, in [`Haptics::new`]; what it does not name has no state and does no work.
 
 pub use super::inputs::Inputs;
 use super::{
@@ -19,12 +19,14 @@ use super::{
     flags::{Fault, Flags},
     friction::{Friction, FrictionState, Pending},
     npmi::{Motion, Npmi},
+    relaxation::{Memory, Relaxation, Remembered},
     source::{ContactSession, TorqueSource},
     torque_history::TorqueHistory,
     watchdog::{self, GREATEST_POSITION_AGE, TickRate, Watchdog},
 };
 use crate::{
     JointVector,
+    contact::Slip,
     field::{Sample, range::HaptizedRange},
     scene::HapticsSpec,
 };
@@ -43,6 +45,7 @@ pub struct Haptics {
     channels: Option<Channels>,
     control: Option<PassivityControl>,
     friction: Option<Friction>,
+    relaxation: Option<Relaxation>,
     watchdog: Watchdog,
     torque_limit: JointVector,
     torque_rate_limit: JointVector,
@@ -67,6 +70,7 @@ pub struct State {
     accounts: Accounts,
     channels: Option<ChannelState>,
     friction: Option<FrictionState>,
+    memory: Option<Memory>,
 }
 
 /// Output of a tick. All but `torque` is for recording and drawing.
@@ -86,6 +90,15 @@ pub struct Output {
     pub fault: Option<Fault>,
     /// At t_k.
     pub accounts: Accounts,
+}
+
+/// Contact at the proxy.
+struct Felt {
+    /// As it would be without a past.
+    elastic: Sample,
+    /// As it is.
+    sample: Sample,
+    remembered: Remembered,
 }
 
 /// Field, proxy and gains do not make a loop.
@@ -136,6 +149,7 @@ impl Haptics {
             channels,
             control,
             friction: spec.friction.as_ref().map(Friction::new),
+            relaxation: spec.relaxation.as_ref().map(|spec| Relaxation::new(spec, period)),
             watchdog,
             torque_limit,
             torque_rate_limit,
@@ -185,6 +199,7 @@ impl Haptics {
             accounts: Accounts::default(),
             channels: None,
             friction: None,
+            memory: None,
         };
         self.begin(&mut state, position);
         Ok(state)
@@ -212,6 +227,7 @@ impl Haptics {
         state.accounts = Accounts { initial, ..Accounts::default() };
         state.channels = self.channels.as_ref().map(Channels::start);
         state.friction = self.friction.map(|_| FrictionState::at_rest(self.joints()));
+        state.memory = self.relaxation.map(|_| Memory::default());
     }
 
     /// One tick. Over a scene that is solved in every tick this makes room for that each time: a session has its own
@@ -238,10 +254,11 @@ impl Haptics {
             state.accounts.device_moved(&self.coupling, inputs.elapsed, moved, &proxy, torque);
             state.device = inputs.position;
         }
-        let (sample, age) = contact.sample(&proxy);
+        let (elastic, age) = contact.sample(&proxy);
+        let (sample, remembered) = self.remember(state, &elastic);
         let stored = self.source.has_energy().then_some(sample.energy);
         let spring = self.coupling.spring_energy(&proxy, &state.device);
-        state.accounts.at_tick(state.motion.kinetic_energy(), spring, stored, sample.index > 0.0);
+        state.accounts.at_tick(state.motion.kinetic_energy(), spring, (stored, remembered.relaxed), sample.index > 0.0);
         let accounts = state.accounts;
         if fault.is_none() && accounts.device_port().is_some_and(|port| port < -GREATEST_GIVEN_ENERGY) {
             fault = Some(Fault::Energy);
@@ -265,8 +282,25 @@ impl Haptics {
         state.held.push(&torque);
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
-        let stopped = self.move_proxy(state, interval, &velocity, &sample, contact);
+        let felt = Felt { elastic, sample, remembered };
+        let stopped = self.move_proxy(state, interval, &velocity, &felt, contact);
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
+    }
+
+    /// Returns what is felt of the `elastic` contact at the proxy, after what the object remembers of its past.
+    fn remember(&self, state: &mut State, elastic: &Sample) -> (Sample, Remembered) {
+        let (Some(relaxation), Some(memory)) = (&self.relaxation, &mut state.memory) else {
+            return (*elastic, Remembered { share: 1.0, stored: elastic.energy, relaxed: 0.0 });
+        };
+        let remembered = relaxation.arrive(memory, elastic.energy);
+        let mut sample = Sample { energy: remembered.stored, ..*elastic };
+        sample.torque.iter_mut().for_each(|tau| *tau *= remembered.share);
+        sample.share *= remembered.share;
+        sample.contact &= remembered.share > 0.0;
+        if !sample.contact {
+            sample.contact_nodes = 0;
+        }
+        (sample, remembered)
     }
 
     /// Returns the torque to command to the device, which moves at `velocity`: coupling, channels, controller [N m or
@@ -299,9 +333,10 @@ impl Haptics {
         state: &mut State,
         interval: f64,
         velocity: &JointVector,
-        sample: &Sample,
+        felt: &Felt,
         contact: &mut ContactSession<'_>,
     ) -> Flags {
+        let Felt { elastic, sample, remembered } = felt;
         let stage = self.npmi.stage(&state.motion, interval);
         let limits = self.npmi.limits();
         let stops = self.range.stops(&state.motion.position, &state.motion.velocity, interval, limits);
@@ -310,6 +345,7 @@ impl Haptics {
             channels: JointVector::zeros(self.joints()),
             friction_work: 0.0,
             presliding: 0.0,
+            drag: 0.0,
             control_dissipation: 0.0,
         };
         // After a fault nothing is known of the hand any more: its channel falls silent.
@@ -322,15 +358,26 @@ impl Haptics {
             rate = control.proxy_rate(&state.accounts, interval, &state.motion);
             stage.add_inertia(rate, &mut load.damping);
         }
+        let mut slip = Slip::default();
+        if self.friction.is_some() || self.relaxation.is_some_and(|relaxation| relaxation.needs_slip()) {
+            slip = contact.slip(&state.motion.position, elastic);
+            slip.normal_force *= remembered.share;
+        }
+        let mut damper = 0.0;
+        if let (Some(relaxation), Some(memory)) = (&self.relaxation, &state.memory) {
+            damper = relaxation.drag(memory, elastic.energy, &slip, &state.proxy_velocity, &mut load);
+        }
         let step = match (&self.friction, &mut state.friction) {
             (Some(friction), Some(memory)) => {
-                let slip = contact.slip(&state.motion.position, sample);
                 let velocity = state.proxy_velocity;
                 let pending = Pending { npmi: &self.npmi, stage: &stage, interval, velocity, load };
                 friction.step(&pending, &slip, memory, &mut state.motion, &mut extra)
             }
             _ => self.npmi.advance(&stage, &mut state.motion, interval, &load),
         };
+        if let (Some(relaxation), Some(memory)) = (&self.relaxation, &mut state.memory) {
+            extra.drag = relaxation.depart(memory, interval, &step.velocity, &slip, damper);
+        }
         extra.control_dissipation = interval * rate * stage.twice_kinetic_energy(&step.velocity);
         state.proxy_velocity = step.velocity;
         state.accounts.stepped(&self.coupling, interval, velocity, &sample.torque, &step, &extra);

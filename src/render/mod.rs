@@ -21,6 +21,7 @@ mod own_motion;
 pub mod passivity;
 pub mod realtime;
 pub mod recording;
+mod relaxation;
 pub mod session;
 pub mod setup;
 pub mod source;

@@ -19,8 +19,8 @@ use crate::{
     object::{Object, ObjectError},
     proxy::Chain,
     scene::{
-        BOUNDARY_SLOPE, Diagnostic, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError,
-        THRESHOLD,
+        BOUNDARY_SLOPE, Diagnostic, HapticsSpec, Interpolation, LEVER_ARM, LINEAR_RELAXATION, ProxyInertia, Rendering,
+        SceneError, THRESHOLD,
     },
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -251,10 +251,19 @@ fn haptic_loop(
     };
     let bounds = passivity::bounds(&gains, &source, &labels(&dataset.grid));
     let advice = passivity::advice(&gains, &source, &bounds);
-    if gains.friction.is_some() && !source.has_slip() {
-        let message = "friction needs to know how contacts slip, which the dataset does not hold: bake a virtual object \
-                       again with this scene; for a real object, which tells no contacts, leave friction out";
-        return Err(Diagnostic::at(&scene.path, &scene.text, "haptics.friction", message.to_owned()).into());
+    if gains.relaxation.is_some() && !source.is_potential() {
+        return Err(Diagnostic::at(&scene.path, &scene.text, "object.relaxation", LINEAR_RELAXATION.to_owned()).into());
+    }
+    if gains.uses_slip() && !source.has_slip() {
+        let (name, place) = match gains.friction {
+            Some(_) => ("friction", "haptics.friction"),
+            None => ("dent", "object.relaxation.dent"),
+        };
+        let message = format!(
+            "{name} needs to know how contacts slip, which the dataset does not hold: bake a virtual object again with \
+             this scene; for a real object, which tells no contacts, leave {name} out"
+        );
+        return Err(Diagnostic::at(&scene.path, &scene.text, place, message).into());
     }
     let haptics = Haptics::new(source, npmi, &gains)?.with_range(range);
     Ok(Loop { haptics, bounds, gains, advice })

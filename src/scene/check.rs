@@ -14,7 +14,8 @@ use toml::{
 
 /// What must be a table, `*` for each entry of a list: serde would take a list of its values as well, without a name.
 const TABLES: &str = "object object.sphere object.mesh object.tetrahedra object.springs object.elasticity \
-    object.elasticity.inclusion.* object.elasticity.inclusion.*.sphere object.skin object.ground proxy proxy.joint.* \
+    object.elasticity.inclusion.* object.elasticity.inclusion.*.sphere object.skin object.ground \
+    object.relaxation proxy proxy.joint.* \
     proxy.joint.*.nodes.* proxy.shape.* proxy.shape.*.cylinder proxy.shape.*.surface contact grid grid.axes.* scan \
     scan.workspace scan.workspace.across.* scan.workspace.depth scan.joints scan.joints.axes.* scan.control \
     scan.limits scan.simulated haptics haptics.friction haptics.four_channel haptics.hand graphics.stiffening motion \

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 /// An effect of a loop: absent unless the scene names it.
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
-    /// Table of the scene's file that it stands in, `haptics` or `graphics`.
+    /// Table of the scene's file that it stands in, `haptics`, `object` or `graphics`.
     pub table: &'static str,
     /// Its key there.
     pub key: &'static str,
@@ -41,7 +41,7 @@ pub struct Tuning {
 }
 
 /// All effects, those of the tick first.
-pub const EFFECTS: [Effect; 8] = [
+pub const EFFECTS: [Effect; 9] = [
     Effect {
         table: "haptics",
         key: "friction",
@@ -49,6 +49,14 @@ pub const EFFECTS: [Effect; 8] = [
         what: "Coulomb friction of the proxy on the object: sticks, gives a little, slides",
         usual: "{ coefficient = 0.4 }",
         copy: |to, from| to.haptics.friction = from.haptics.friction,
+    },
+    Effect {
+        table: "object",
+        key: "relaxation",
+        name: "Relaxation",
+        what: "The object's force fades while it is held, and its dent recovers",
+        usual: "{ terms = [[0.55, 0.05], [0.2, 0.5]] }",
+        copy: |to, from| to.haptics.relaxation.clone_from(&from.haptics.relaxation),
     },
     Effect {
         table: "haptics",
@@ -153,6 +161,7 @@ impl Effect {
         let plain = HapticsSpec {
             proxy_inertia: ProxyInertia::Constant,
             friction: None,
+            relaxation: None,
             four_channel: None,
             passivity_control: false,
             ..tuning.haptics.clone()
@@ -208,7 +217,9 @@ mod tests {
     use super::*;
 
     fn sphere() -> Scene {
-        Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap()
+        let text = include_str!("../../tests/scenes/sphere.toml");
+        // Relaxation asks for it.
+        Scene::parse(&text.replace("\"linear\"", "\"potential\""), "sphere.toml").unwrap()
     }
 
     #[test]

@@ -63,11 +63,19 @@ pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result
     Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }
 
+/// Why a torque that is interpolated alone does not relax.
+pub const LINEAR_RELAXATION: &str = "relaxation acts on the root of the object's energy, of which interpolation = \"linear\" is not the gradient, and \
+     would give energy from nowhere: leave relaxation out, or set interpolation = \"potential\" in [haptics] for a \
+     virtual object";
+
 /// Validates what rendering needs of `table`, and takes it.
 pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result<Rendering, SceneError> {
     let proxy = table.proxy.check(checker)?;
     let joints = &proxy.joints;
-    let object = take(&mut table.object).map(|object| object.check(checker)).transpose()?;
+    let mut object = take(&mut table.object);
+    let relaxation = object.as_mut().and_then(|object| object.relaxation.take());
+    let relaxation = relaxation.map(|relaxation| relaxation.check(checker)).transpose()?;
+    let object = object.map(|object| object.check(checker)).transpose()?;
     // A virtual object is drawn unless the scene says no; a real one moves by no forces that are known.
     let graphics = match table.graphics {
         Some(GraphicsEntry::Loop(graphics)) => Some(graphics),
@@ -82,6 +90,10 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
         haptics.interpolation = Interpolation::Linear;
     }
+    if relaxation.is_some() && !haptics.interpolation.is_potential() {
+        return Err(checker.at("object.relaxation", LINEAR_RELAXATION));
+    }
+    haptics.relaxation = relaxation;
     haptics.check(checker, joints)?;
     let (motion, device) = (take(&mut table.motion), take(&mut table.device));
     motion.check(checker, joints)?;

@@ -6,7 +6,7 @@
 use super::check::Checker;
 use super::gains::{GAINS, OF_THE_DEVICE, OF_THE_HAND};
 use super::value::{KEY, Range, defaults, gains, positive, positive_gains, share};
-use super::{JointSpec, SceneError};
+use super::{JointSpec, RelaxationSpec, SceneError};
 use crate::JointVector;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error};
@@ -80,6 +80,9 @@ pub struct HapticsSpec {
     pub device_friction: JointVector,
     /// Friction between the proxy and the object, where the scene names it, as each of the two effects below.
     pub friction: Option<FrictionSpec>,
+    /// Memory of the object, which the scene names in its table.
+    #[serde(skip)]
+    pub relaxation: Option<RelaxationSpec>,
     /// Force channels beside the spring and damper of the virtual coupling.
     pub four_channel: Option<FourChannelSpec>,
     /// Whether a passivity controller acts when the passivity observer is negative.
@@ -209,6 +212,7 @@ impl Default for HapticsSpec {
             encoder_step: unset,
             device_friction: unset,
             friction: None,
+            relaxation: None,
             four_channel: None,
             passivity_control: false,
             hand: HandSpec::default(),
@@ -223,6 +227,12 @@ impl Default for FourChannelSpec {
 }
 
 impl HapticsSpec {
+    /// Whether the loop needs to know how contacts slip.
+    #[must_use]
+    pub fn uses_slip(&self) -> bool {
+        self.friction.is_some() || self.relaxation.as_ref().is_some_and(|relaxation| relaxation.dent.is_some())
+    }
+
     /// Fits it to the arm's `joints`, and checks it.
     pub(super) fn check(&mut self, checker: &Checker<'_>, joints: &[JointSpec]) -> Result<(), SceneError> {
         self.proxy_damping_is_free = self.proxy_damping.is_empty();

@@ -19,6 +19,7 @@ mod motion;
 mod object;
 mod own_text;
 mod proxy;
+mod relaxation;
 mod scan;
 mod shape;
 mod skin;
@@ -30,6 +31,7 @@ pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
 pub use error::{Diagnostic, SceneError};
+pub(crate) use file::LINEAR_RELAXATION;
 pub use gains::GainError;
 pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};
 pub use grid::{AxisSpec, GRID_LINE, GRID_STEP_SLACK, GridSpec};
@@ -43,6 +45,7 @@ pub use object::{
     SpringKind, SpringSpec,
 };
 pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
+pub use relaxation::{MOST_TERMS, RelaxationSpec};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
 pub use skin::SkinSpec;

@@ -126,7 +126,7 @@ impl<'a> Sweep<'a> {
                 surface_nodes: object.surface_nodes,
                 with_forces,
                 with_tangent: false,
-                with_slip: scene.haptics.friction.is_some(),
+                with_slip: scene.haptics.uses_slip(),
             },
             with_forces,
             grid,

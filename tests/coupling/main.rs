@@ -6,6 +6,8 @@
 mod block;
 mod channels;
 mod effects;
+mod history;
+mod memory;
 mod passivity;
 #[path = "../../src/random.rs"]
 #[allow(dead_code, unreachable_pub)] // The library has more use for it.

@@ -37,7 +37,8 @@ pub use space::{Place, Space, SpaceError};
 use crate::{MAX_JOINTS, dataset::Grid};
 pub(crate) use block::beyond;
 pub use levels::Root;
-pub(crate) use levels::{Gathered, Levels, added, linear, root, with_joints};
+use levels::linear;
+pub(crate) use levels::{Gathered, Levels, added, root, with_joints};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
 use space::MOST_BLOCK_JOINTS;
 use std::{
