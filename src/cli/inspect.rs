@@ -103,6 +103,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         json["skin"] = serde_json::to_value(skin)?;
         writeln!(text, "  skin         {skin}")?;
     }
+    if let Some(error) = object.lattice_error(&scene.object, &model.compliance) {
+        json["lattice"] = serde_json::to_value(error)?;
+        writeln!(text, "  lattice      {error}")?;
+    }
     if let Some(dataset) = &dataset {
         let haptics = &scene.haptics;
         let field =
