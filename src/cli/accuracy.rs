@@ -1,12 +1,18 @@
 //! `haptize accuracy`: what accuracy costs in time, for one scene.
 
-use super::{Failure, Report, output::Folder, reach, tell};
+use super::{
+    Failure,
+    output::{Folder, Overwritten},
+    reach,
+    report::{self, Describe, Report, Text},
+    tell,
+};
 use crate::{
-    scene::Scene,
-    studies::accuracy::{self, Extent},
+    scene::{Interpolation, Scene},
+    studies::accuracy::{self, Accuracy, Extent, LIVE, Limit, Offer, Row, Study},
     sweep::BackendChoice,
 };
-use serde_json::Value;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Arguments of `haptize accuracy`.
@@ -45,13 +51,84 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = reach::complete(scene, BackendChoice::Cpu, false)?;
     let found = accuracy::measure(&scene, extent, &mut progress)?;
     let files = accuracy::write_all(&arguments.output, &found)?;
-    let mut json = serde_json::to_value(&found)?;
-    json["offers"] = serde_json::to_value(accuracy::offers(&found))?;
-    json["limits"] = serde_json::to_value(accuracy::limits(&found))?;
-    json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
-    let mut text = String::new();
-    accuracy::describe(&mut text, &found)?;
-    text.push_str(&format!("{} files in {}\n", files.len(), arguments.output.display()));
-    folder.close(&files, &mut text, &mut json)?;
-    Ok(Report { text, json, whole: true })
+    let measured = Measured {
+        offers: accuracy::offers(&found),
+        limits: accuracy::limits(&found),
+        found,
+        overwritten: folder.close(&files)?,
+        files: report::names(&files),
+        folder: arguments.output.display().to_string(),
+    };
+    Report::new(&measured)
+}
+
+/// What accuracy costs.
+#[derive(Serialize)]
+struct Measured {
+    #[serde(flatten)]
+    found: Accuracy,
+    /// Cheapest grid for each error.
+    offers: Vec<Offer>,
+    /// What limits the scene's own accuracy.
+    limits: Vec<Limit>,
+    files: Vec<String>,
+    #[serde(flatten)]
+    overwritten: Overwritten,
+    #[serde(skip)]
+    folder: String,
+}
+
+impl Describe for Measured {
+    fn describe(&self, text: &mut Text) {
+        let Self { found, offers, limits, files, overwritten, folder } = self;
+        let Accuracy { scene, configurations, in_contact, left_out, norm, torque, reference_error, .. } = found;
+        text.line(format_args!(
+            "{scene}: {configurations} random configurations, {in_contact} in contact, {left_out} left out; rms torque \
+             {torque:.4} {norm}, the reference errs by {reference_error:.1e}"
+        ));
+        for name in Interpolation::ALL.map(Interpolation::name) {
+            if let Some(order) = found.order(Study::Spacing, name) {
+                text.row("order", format_args!("{name:<9} error falls with spacing to the power {order:.2}"));
+            }
+        }
+        for Offer { target, series, spacing, points, cost, .. } in offers {
+            let (percent, unit) = (100.0 * target, found.unit);
+            text.row(
+                format!("for {percent:>4.0} %"),
+                format_args!("take {series} at {spacing:.4} {unit}: {points} points, {cost:.2} of the scene's bake"),
+            );
+        }
+        for study in [Study::Mesh, Study::Links, Study::Skin, Study::Stiffness] {
+            let Some(own) = found.of(study).find(|row| row.value == 1.0) else { continue };
+            let falls = match found.order(study, &own.series) {
+                Some(order) => format!("changes fall with the power {order:.2}"),
+                None => "changes do not fall".to_owned(),
+            };
+            let change = 100.0 * found.relative(own);
+            text.row(&own.series, format_args!("the next step changes {change:.2} %; {falls}"));
+        }
+        let errs = |row: &Row| match 100.0 * found.relative(row) {
+            error if error < 0.01 => format!("{} below 0.01 %", row.setting),
+            error => format!("{} {error:.2} %", row.setting),
+        };
+        let [looked, followed] = [false, true].map(|live| {
+            let rows = found.of(Study::Lookup).filter(|row| (row.series == LIVE) == live);
+            rows.map(errs).collect::<Vec<_>>().join(", ")
+        });
+        text.row("look-up", format_args!("`linear` {:.0} ns; errors: {looked}", 1e9 * found.look_up));
+        text.row(
+            "live",
+            format_args!(
+                "{:.0} us a solution in contact, by the law at rest; errors, solved {followed}",
+                1e6 * found.solution
+            ),
+        );
+        let limits: Vec<_> = limits.iter().map(|limit| format!("{} {:.2} %", limit.of, 100.0 * limit.error)).collect();
+        if !limits.is_empty() {
+            text.row("limited by", limits.join(", "));
+        }
+        found.notes.iter().for_each(|note| text.row("note", note));
+        text.row("written to", format_args!("{folder}, {} files", files.len()));
+        overwritten.describe(text);
+    }
 }

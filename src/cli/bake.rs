@@ -1,17 +1,23 @@
 //! `haptize bake`: a scene haptized into a dataset.
 
 use super::{
-    Failure, Report, max_error,
+    Failure,
+    baked::Baked,
+    max_error::{self, AccuracyGoal},
     output::{self, Content},
-    reach, refine,
+    reach,
+    refine::{self, RefinementGoal},
+    report::{Describe, Report, Text},
     shard::ShardChoice,
-    watch::{configurations, describe, touches, warn, watched},
+    tell,
+    watch::{configurations, watched},
 };
 use crate::{
-    scene::{Algorithm, ContactGeometry, Scene},
+    scene::{ContactLaw, Scene},
     store::space::MAX_LEVELS,
     sweep::{Aim, BackendChoice, Bake, Shard, Sweep, SweepReport},
 };
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Arguments of `haptize bake`.
@@ -37,13 +43,10 @@ pub struct Arguments {
     /// The backend that solves contact.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
-    /// The law of contact, instead of the scene's: before which surface depths and directions are taken.
-    #[arg(long, conflicts_with = "algorithm")]
-    geometry: Option<ContactGeometry>,
-    /// How contact is solved, instead of as the scene says: by the paper's iteration, or as --geometry following or
-    /// rest.
+    /// The law of contact, instead of the scene's: depths and directions before the surface at rest or before the
+    /// deformed one, or the paper's iteration.
     #[arg(long)]
-    algorithm: Option<Algorithm>,
+    law: Option<ContactLaw>,
     /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the
     /// measurement of the error, which come last, start again.
     #[arg(long)]
@@ -59,7 +62,7 @@ pub struct Arguments {
     /// Instead of choosing a uniform grid for --max-error, refine the scene's grid where it errs: by up to so many
     /// levels, itself included, each of half the spacing.
     #[arg(long, value_name = "LEVELS", requires = "max_error",
-        conflicts_with_all = ["resume", "algorithm", "geometry", "shard"],
+        conflicts_with_all = ["resume", "law", "shard"],
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
     refine: Option<u32>,
     /// Maximum number of grid points that --max-error may choose.
@@ -79,9 +82,7 @@ pub struct Arguments {
 /// continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut scene = Scene::load(&arguments.scene)?;
-    if let Some(algorithm) = arguments.algorithm.or(arguments.geometry.map(Into::into)) {
-        scene.contact.algorithm = algorithm;
-    }
+    scene.contact.law = arguments.law.unwrap_or(scene.contact.law);
     if let Some(shard) = arguments.shard {
         return run_shard(arguments, &scene, shard.shard(|name| std::env::var(name).ok())?);
     }
@@ -94,49 +95,46 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     output::check(&Sweep::growing_of(&output), Content::Dataset, [])?;
     let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
     if let (Some(aim), Some(levels)) = (arguments.max_error, arguments.refine) {
-        let wanted = refine::RefinementGoal { aim, levels, most: arguments.max_points, output: &output };
-        let mut report = refine::run(&scene, &wanted, arguments.backend)?;
-        earlier.tell(&mut report.text, &mut report.json);
-        return Ok(report);
+        let goal = RefinementGoal { aim, levels, most: arguments.max_points, output: &output };
+        return refine::run(&scene, &goal, arguments.backend, earlier);
     }
     if let Some(aim) = arguments.max_error {
-        let wanted =
-            max_error::AccuracyGoal { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
-        let mut report = max_error::run(&scene, &wanted, arguments.backend)?;
-        earlier.tell(&mut report.text, &mut report.json);
-        return Ok(report);
+        let goal = AccuracyGoal { aim, points: arguments.max_points, output: &output, resume: arguments.resume };
+        return max_error::run(&scene, &goal, arguments.backend, earlier);
     }
     let bake = |bake: Bake<'_>| bake.to_file(&output, arguments.resume);
-    let report = watched(&scene, arguments.backend, |own| bake(Bake { measured: arguments.measure_error, ..own }))?;
-    warn(&report);
-    let mut json = serde_json::to_value(&report)?;
-    json["file"] = output.display().to_string().into();
-    let mut text = String::new();
-    describe(&mut text, &output, &report, None)?;
-    earlier.tell(&mut text, &mut json);
-    // Every point was solved and says what became of it: that is the whole work, if anything touches.
-    let whole = touches(&report, &output, arguments.allow_free, &mut json)?;
-    Ok(Report { text, json, whole })
+    let sweep = watched(&scene, arguments.backend, |own| bake(Bake { measured: arguments.measure_error, ..own }))?;
+    let baked = Baked::new(sweep, &output, None, earlier)?;
+    Report::of(&baked, baked.is_whole(arguments.allow_free))
+}
+
+/// A shard that was solved.
+#[derive(Serialize)]
+struct BakedShard {
+    /// Absent where it was there already.
+    #[serde(flatten)]
+    sweep: Option<SweepReport>,
+    file: String,
+    shard: Shard,
+}
+
+impl Describe for BakedShard {
+    fn describe(&self, text: &mut Text) {
+        let Self { sweep, file, shard } = self;
+        let Some(sweep) = sweep else { return text.line(format_args!("{file}: shard {shard}, there already")) };
+        let SweepReport { points, contact_points, resumed_points, seconds, backend, adapter, .. } = sweep;
+        text.line(format_args!(
+            "{file}: shard {shard}, {points} points, {contact_points} in contact, {resumed_points} of an earlier run; \
+             {seconds:.2} s on {backend} ({adapter})"
+        ));
+    }
 }
 
 /// Solves one shard.
 fn run_shard(arguments: &Arguments, scene: &Scene, shard: Shard) -> Result<Report, Failure> {
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from("."));
-    let (file, report) = watched(scene, arguments.backend, |bake| bake.to_shard(&folder, shard))?;
-    let file = file.display();
-    let (text, mut json) = match report {
-        None => (format!("{file}: shard {shard}, there already\n"), serde_json::json!({})),
-        Some(report) => {
-            warn(&report);
-            let SweepReport { points, contact_points, resumed_points, seconds, backend, adapter, .. } = &report;
-            let text = format!(
-                "{file}: shard {shard}, {points} points, {contact_points} in contact, {resumed_points} of an earlier \
-                 run; {seconds:.2} s on {backend} ({adapter})\n"
-            );
-            (text, serde_json::to_value(&report)?)
-        }
-    };
-    json["file"] = file.to_string().into();
-    json["shard"] = serde_json::to_value(shard)?;
-    Ok(Report { text, json, whole: true })
+    let (file, sweep) = watched(scene, arguments.backend, |bake| bake.to_shard(&folder, shard))?;
+    let warnings = sweep.iter().flat_map(|sweep| &sweep.warnings);
+    warnings.for_each(|warning| tell(format_args!("haptize: {warning}")));
+    Report::new(&BakedShard { sweep, file: file.display().to_string(), shard })
 }

@@ -1,7 +1,11 @@
 //! `haptize completions`: what makes a shell complete commands and options.
 
-use super::{Failure, Report};
+use super::{
+    Failure,
+    report::{Describe, Report, Text},
+};
 use clap_complete::Shell;
+use serde::Serialize;
 
 /// For which shell.
 #[derive(clap::Args)]
@@ -19,7 +23,18 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut super::command_line(), "haptize", &mut script);
-    let text = String::from_utf8(script)?;
-    let json = serde_json::json!({ "shell": arguments.shell.to_string(), "script": text });
-    Ok(Report { text, json, whole: true })
+    Report::new(&Completions { shell: arguments.shell.to_string(), script: String::from_utf8(script)? })
+}
+
+/// The script of a shell.
+#[derive(Serialize)]
+struct Completions {
+    shell: String,
+    script: String,
+}
+
+impl Describe for Completions {
+    fn describe(&self, text: &mut Text) {
+        text.line(self.script.trim_end());
+    }
 }

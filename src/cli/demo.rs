@@ -4,16 +4,24 @@
 //! The press runs twice: as fast as it goes, which gives the same trace and figures on every machine, and against the
 //! clock, which shows what a tick costs on this one and how punctual it is.
 
-use super::{Failure, Report, motion, output::Folder, played, shell, tell, watch};
+use super::{
+    Failure,
+    baked::Baked,
+    motion,
+    output::{Folder, Overwritten},
+    played::{self, describe_session},
+    report::{self, Describe, Report, Text},
+    shell, tell, watch,
+};
 use crate::{
-    dataset::Dataset,
-    render::{realtime::Options, setup::Setup},
-    report,
+    dataset::{self, Dataset, JointLabel},
+    render::{realtime::Options, setup::Setup, timing::Timing, trace::Summary},
+    report::FIGURES,
     scene::Scene,
     sweep::BackendChoice,
 };
+use serde::Serialize;
 use std::{
-    fmt::Write,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -32,14 +40,13 @@ pub fn run() -> Result<Report, Failure> {
     let folder = Path::new(FOLDER);
     std::fs::create_dir_all(folder)
         .map_err(|error| format!("cannot make the folder ./{FOLDER}: {error}; change to a folder of yours"))?;
-    let names = played::FILES.into_iter().chain(report::FIGURES).chain([DATASET]);
+    let names = played::FILES.into_iter().chain(FIGURES).chain([DATASET]);
     let earlier = Folder::check(folder, names, [])?;
     let scene = Scene::parse(SCENE, "datasets/sphere.toml")?;
     let file: PathBuf = folder.join(DATASET);
 
     tell(format_args!("haptizing the sphere, contact at {} configurations ...", points(&scene)));
     let (baked, sweep) = watch::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
-    watch::warn(&sweep);
     baked.save(&file)?;
     let dataset = Arc::new(Dataset::load(&file)?);
 
@@ -58,29 +65,60 @@ pub fn run() -> Result<Report, Failure> {
     tell(format_args!("drawing ..."));
     let mut files = vec![file.clone(), ticks?];
     files.extend(played::write(&setup, &dataset, &played, folder)?);
-    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    let demo = Demo {
+        bake: Baked::new(sweep, &file, None, None)?,
+        press: played.trace.summary(),
+        timing: played.timing,
+        overwritten: earlier.close(&files)?,
+        files: report::names(&files),
+        held: dataset.summary(),
+        joints: played.trace.joints.clone(),
+        rates: [scene.haptics.rate, scene.graphics.map_or(0.0, |graphics| graphics.rate)],
+        dataset: shell::file(&file),
+    };
+    Report::new(&demo)
+}
 
-    let rate = scene.graphics.map_or(0.0, |graphics| graphics.rate);
-    let press = played.trace.summary();
-    let held = dataset.summary();
-    let mut text = String::new();
-    watch::describe(&mut text, &file, &sweep, None)?;
-    let torque = held.torque.as_flattened().iter().fold(0.0_f64, |most, tau| most.max(tau.abs()));
-    writeln!(text, "  torque       at most {torque:.3} N m at a joint")?;
-    if let (Some(force), Some(nodes)) = (held.max_force, held.max_contacts) {
-        writeln!(text, "  force        at most {force:.2} N on a node of the object, at most {nodes} nodes at once")?;
+/// What the demo has baked, felt and written.
+#[derive(Serialize)]
+struct Demo {
+    bake: Baked,
+    press: Summary,
+    timing: Option<Timing>,
+    files: Vec<String>,
+    #[serde(flatten)]
+    overwritten: Overwritten,
+    #[serde(skip)]
+    held: dataset::Summary,
+    #[serde(skip)]
+    joints: Vec<JointLabel>,
+    /// Ticks and frames a second.
+    #[serde(skip)]
+    rates: [f64; 2],
+    /// The dataset's file, as a shell takes it.
+    #[serde(skip)]
+    dataset: String,
+}
+
+impl Describe for Demo {
+    fn describe(&self, text: &mut Text) {
+        let Self { bake, press, timing, files, overwritten, held, joints, rates: [ticks, frames], dataset } = self;
+        bake.describe(text);
+        let torque = held.torque.as_flattened().iter().fold(0.0_f64, |most, tau| most.max(tau.abs()));
+        text.row("torque", format_args!("at most {torque:.3} N m at a joint"));
+        if let (Some(force), Some(nodes)) = (held.max_force, held.max_contacts) {
+            text.row(
+                "force",
+                format_args!("at most {force:.2} N on a node of the object, at most {nodes} nodes at once"),
+            );
+        }
+        describe_session(text, "press, as fast as it goes: ", press, joints);
+        text.line(format_args!("press against the clock, {ticks:.0} ticks and {frames:.0} frames a second:"));
+        timing.describe(text);
+        overwritten.describe(text);
+        text.line(format_args!("written: {}", files.join(" ")));
+        text.line(format_args!("next: haptize info {dataset}, haptize play {dataset} --motion scrape, haptize --help"));
     }
-    write!(text, "press, as fast as it goes: ")?;
-    played::describe(&mut text, &press, &played.trace.joints)?;
-    if let Some(timing) = &played.timing {
-        writeln!(text, "press against the clock, {:.0} ticks and {rate:.0} frames a second:", scene.haptics.rate)?;
-        played::describe_timing(&mut text, timing)?;
-    }
-    writeln!(text, "written: {}", names.join(" "))?;
-    writeln!(text, "next: haptize info {0}, haptize play {0} --motion scrape, haptize --help", shell::file(&file))?;
-    let mut json = serde_json::json!({ "bake": sweep, "press": press, "timing": played.timing, "files": names });
-    earlier.close(&files, &mut text, &mut json)?;
-    Ok(Report { text, json, whole: true })
 }
 
 /// Grid points of `scene`.

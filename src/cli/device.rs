@@ -1,17 +1,18 @@
 //! `haptize device`: which real devices this machine has, and a careful first run of one.
 
-use super::{Failure, Report, interrupt, keyboard::Keyboard, tell};
+use super::{
+    Failure, interrupt,
+    keyboard::Keyboard,
+    report::{Describe, Report, Text},
+    tell,
+};
 use crate::{
     control::{CheckReport, PUSH_SHARE, Phase, check},
-    device::{Address, Guard, Key, Kind, LIMIT_SHARE, OpenError, Watchdog, open},
+    device::{Address, Coordinates, Finding, Guard, Key, Kind, LIMIT_SHARE, OpenError, Watchdog, open},
     scene::Rendering,
 };
-use serde_json::json;
-use std::{
-    fmt::{self, Write},
-    path::PathBuf,
-    sync::atomic::Ordering,
-};
+use serde::Serialize;
+use std::{path::PathBuf, sync::atomic::Ordering};
 
 /// Arguments of `device`.
 #[derive(clap::Args)]
@@ -61,22 +62,43 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
 }
 
-fn list() -> Result<Report, Failure> {
-    let mut text = String::new();
-    let mut devices = Vec::new();
-    for kind in Kind::ALL {
-        let found = kind.find();
-        writeln!(text, "{:<18} {}", kind.name(), kind.title())?;
-        for place in &found.places {
-            writeln!(text, "{:<18}   {place}", "")?;
-        }
-        for missing in &found.missing {
-            writeln!(text, "{:<18}   -> {missing}", "")?;
-        }
-        devices.push(json!({ "kind": kind.name(), "title": kind.title(), "found": found }));
+/// Kinds of devices, and what of them is here.
+#[derive(Serialize)]
+struct Devices {
+    devices: Vec<Listed>,
+}
+
+/// A kind of device.
+#[derive(Serialize)]
+pub struct Listed {
+    /// Its name, as commands take it.
+    pub kind: &'static str,
+    title: &'static str,
+    /// Where it is, and what is missing.
+    pub found: Finding,
+}
+
+impl Listed {
+    /// Looks for devices of `kind`.
+    pub fn look(kind: Kind) -> Self {
+        Self { kind: kind.name(), title: kind.title(), found: kind.find() }
     }
-    writeln!(text, "`haptize device check NAME` runs one carefully for the first time.")?;
-    Ok(Report { text, json: json!({ "devices": devices }), whole: true })
+}
+
+fn list() -> Result<Report, Failure> {
+    Report::new(&Devices { devices: Kind::ALL.map(Listed::look).into() })
+}
+
+impl Describe for Devices {
+    fn describe(&self, text: &mut Text) {
+        text.line("kinds of devices:");
+        for Listed { kind, title, found } in &self.devices {
+            text.row(*kind, title);
+            found.places.iter().for_each(|place| text.row("", format_args!("  {place}")));
+            found.missing.iter().for_each(|missing| text.row("", format_args!("  -> {missing}")));
+        }
+        text.line("`haptize device check NAME` runs one carefully for the first time.");
+    }
 }
 
 fn examine(arguments: &Check) -> Result<Report, Failure> {
@@ -112,43 +134,32 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
         }
     }
     let (coordinates, limits) = (guard.coordinates(), *guard.limits());
-    let unit = coordinates.effort_unit();
-    let description = guard.description();
-    let limit: Vec<f64> = limits.effort.to_vec();
-    let most: Vec<f64> = guard.most().to_vec();
+    let checked = Checked {
+        device: arguments.device.to_string(),
+        description: guard.description(),
+        limit: limits.effort.to_vec(),
+        most: guard.most().to_vec(),
+        watchdog: limits.watchdog,
+        phases: reports,
+        coordinates,
+    };
     drop(guard);
     interrupt::over();
-    let whole = reports.len() == phases.len() && reports.iter().all(CheckReport::is_good);
-    let mut text = String::new();
-    writeln!(text, "{}: {description}", arguments.device)?;
-    writeln!(
-        text,
-        "  limit        {limit:.4?} {unit}; used: {LIMIT_SHARE} of it, {PUSH_SHARE} in this check, at most {most:.4?}"
-    )?;
-    match limits.watchdog {
-        Watchdog::After(time) => {
-            writeln!(text, "  watchdog     the device lets go {:.0} ms after the last command", 1e3 * time)?
-        }
-        Watchdog::Unstated => writeln!(
-            text,
-            "  watchdog     the device lets go when commands stop, after a time that its maker does not state"
-        )?,
-        Watchdog::None => writeln!(
-            text,
-            "  watchdog     NONE in the device: if haptize is killed or the machine hangs, the last torque stays on; \
-             keep its power switch at hand"
-        )?,
-    }
-    reports.iter().try_for_each(|report| describe(&mut text, report, coordinates.unit()))?;
-    let json = json!({
-        "device": arguments.device.to_string(),
-        "description": description,
-        "limit": limit,
-        "most": most,
-        "watchdog": limits.watchdog,
-        "phases": reports,
-    });
-    Ok(Report { text, json, whole })
+    Report::of(&checked, checked.phases.len() == phases.len() && checked.phases.iter().all(CheckReport::is_good))
+}
+
+/// A device that was checked.
+#[derive(Serialize)]
+struct Checked {
+    device: String,
+    description: String,
+    /// Effort of each coordinate that the device bears, and the most that is used (N m or N).
+    limit: Vec<f64>,
+    most: Vec<f64>,
+    watchdog: Watchdog,
+    phases: Vec<CheckReport>,
+    #[serde(skip)]
+    coordinates: Coordinates,
 }
 
 fn instruction(phase: Phase) -> &'static str {
@@ -159,30 +170,60 @@ fn instruction(phase: Phase) -> &'static str {
     }
 }
 
-fn describe(text: &mut String, report: &CheckReport, unit: &str) -> fmt::Result {
+impl Describe for Checked {
+    fn describe(&self, text: &mut Text) {
+        let Self { device, description, limit, most, watchdog, phases, coordinates } = self;
+        text.line(format_args!("{device}: {description}"));
+        let unit = coordinates.effort_unit();
+        text.row(
+            "limit",
+            format_args!(
+                "{limit:.4?} {unit}; used: {LIMIT_SHARE} of it, {PUSH_SHARE} in this check, at most {most:.4?}"
+            ),
+        );
+        let lets_go = "the device lets go";
+        text.row(
+            "watchdog",
+            match watchdog {
+                Watchdog::After(time) => format!("{lets_go} {:.0} ms after the last command", 1e3 * time),
+                Watchdog::Unstated => {
+                    format!("{lets_go} when commands stop, after a time that its maker does not state")
+                }
+                Watchdog::None => {
+                    "NONE in the device: if haptize is killed or the machine hangs, the last torque stays \
+                                   on; keep its power switch at hand"
+                        .into()
+                }
+            },
+        );
+        phases.iter().for_each(|phase| describe_phase(text, phase, coordinates.unit()));
+    }
+}
+
+/// Describes a phase, whose coordinates are in `unit`.
+fn describe_phase(text: &mut Text, report: &CheckReport, unit: &str) {
     let name = match report.phase {
         Phase::Reading => "reading",
         Phase::ZeroTorque => "zero torque",
         Phase::Push => "push",
     };
     let rate = report.fresh as f64 / report.seconds.max(f64::MIN_POSITIVE);
-    writeln!(text, "  {name:<12} {rate:.0} new positions a second, the oldest {:.1} ms old", 1e3 * report.oldest)?;
-    for (a, [least, most]) in report.range.iter().enumerate() {
+    let oldest = 1e3 * report.oldest;
+    text.row(name, format_args!("{rate:.0} new positions a second, the oldest {oldest:.1} ms old"));
+    for (a, range) in report.range.iter().enumerate() {
         // Without a sign of zero.
-        let [least, most] = [least, most].map(|end| (1e4 * end).round() / 1e4 + 0.0);
-        write!(text, "    {a}: {least:.4} to {most:.4} {unit}")?;
-        match (report.phase, report.moves_along[a]) {
-            (Phase::Push, _) if !report.pushed[a] => write!(text, ", NOT pushed: hold the space bar all the time")?,
+        let [least, most] = range.map(|end| (1e4 * end).round() / 1e4 + 0.0);
+        let pushed = match (report.phase, report.moves_along[a]) {
+            (Phase::Push, _) if !report.pushed[a] => ", NOT pushed: hold the space bar all the time".to_owned(),
             (Phase::Push, along) => {
                 let how = if along < 0.0 { ": it moves AGAINST the push" } else { "" };
-                write!(text, ", work of the push {along:.1e} J{how}")?;
+                format!(", work of the push {along:.1e} J{how}")
             }
-            _ => (),
-        }
-        writeln!(text)?;
+            _ => String::new(),
+        };
+        text.row("", format_args!("{a}: {least:.4} to {most:.4} {unit}{pushed}"));
     }
     for (reason, ticks) in &report.tally.halted {
-        writeln!(text, "    without torque for {ticks} ticks: {reason}")?;
+        text.row("", format_args!("without torque for {ticks} ticks: {reason}"));
     }
-    Ok(())
 }

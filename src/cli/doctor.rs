@@ -3,13 +3,17 @@
 //! Nothing here is needed for correct results except a place to write to. Real-time scheduling and locked memory keep
 //! the 1 kHz loop punctual (`play --realtime`).
 
-use super::{Failure, Report};
+use super::{
+    Failure,
+    device::Listed,
+    report::{Describe, Report, Text},
+};
 use crate::{
     device::Kind,
     gpu::{ADAPTER_VARIABLE, AdapterSummary, adapters, named_adapters},
 };
 use serde::Serialize;
-use std::{fmt::Write, thread};
+use std::thread;
 
 /// No arguments of its own.
 #[derive(clap::Args)]
@@ -34,144 +38,146 @@ struct Finding {
     remedy: &'static str,
 }
 
-/// Looks at the machine.
-pub fn run(_: &Arguments) -> Result<Report, Failure> {
-    let threads = thread::available_parallelism().map_or(1, usize::from);
-    let graphics = Graphics::look();
-    let findings = [writing(), scheduling(), locking()];
-    let whole = findings.iter().all(|finding| finding.good || !finding.essential);
-
-    let mut text = String::new();
-    writeln!(text, "haptize {} on {} {}", env!("CARGO_PKG_VERSION"), std::env::consts::OS, std::env::consts::ARCH)?;
-    writeln!(text, "CPU threads            {threads}")?;
-    graphics.tell(&mut text)?;
-    let automatic = graphics.automatic();
-    let bakes = match automatic {
-        "gpu" if graphics.are_named => "gpu",
-        "gpu" => "gpu; all CPU threads for what they solve in seconds",
-        "cpu" => "cpu, all threads; hardware GPUs for long bakes, where there are any",
-        none => none,
-    };
-    writeln!(text, "{:<22} {bakes}", "haptize bake takes")?;
-    for finding in &findings {
-        writeln!(text, "{:<22} {}", finding.subject, finding.seen)?;
-        if !finding.good {
-            writeln!(text, "{:<22} -> {}", "", finding.remedy)?;
-        }
-    }
-    let devices: Vec<(Kind, _)> =
-        Kind::ALL.into_iter().filter(|kind| *kind != Kind::Simulated).map(|kind| (kind, kind.find())).collect();
-    for (rank, (kind, found)) in devices.iter().enumerate() {
-        let head = if rank == 0 { "haptic devices" } else { "" };
-        let seen = if found.places.is_empty() { "not found".into() } else { found.places.join(", ") };
-        writeln!(text, "{head:<22} {}: {seen}", kind.name())?;
-        found.missing.iter().try_for_each(|missing| writeln!(text, "{:<22} -> {missing}", ""))?;
-    }
-    let devices: Vec<_> =
-        devices.iter().map(|(kind, found)| serde_json::json!({ "kind": kind.name(), "found": found })).collect();
-    let json = serde_json::json!({
-        "devices": devices,
-        "version": env!("CARGO_PKG_VERSION"),
-        "system": std::env::consts::OS,
-        "architecture": std::env::consts::ARCH,
-        "threads": threads,
-        "adapters": graphics.describe(),
-        "automatic_backend": automatic,
-        "findings": findings,
-        "whole": whole,
-    });
-    Ok(Report { text, json, whole })
+/// What this machine offers.
+#[derive(Serialize)]
+struct Machine {
+    version: &'static str,
+    system: &'static str,
+    architecture: &'static str,
+    /// Threads of the CPU.
+    threads: usize,
+    #[serde(flatten)]
+    graphics: Graphics,
+    /// Backend of long bakes.
+    automatic_backend: &'static str,
+    findings: [Finding; 3],
+    devices: Vec<Listed>,
+    whole: bool,
 }
 
-/// Lists what there is to draw and to compute on.
+/// Looks at the machine.
+pub fn run(_: &Arguments) -> Result<Report, Failure> {
+    let graphics = Graphics::look();
+    let findings = [writing(), scheduling(), locking()];
+    let machine = Machine {
+        version: env!("CARGO_PKG_VERSION"),
+        system: std::env::consts::OS,
+        architecture: std::env::consts::ARCH,
+        threads: thread::available_parallelism().map_or(1, usize::from),
+        automatic_backend: graphics.automatic(),
+        graphics,
+        whole: findings.iter().all(|finding| finding.good || !finding.essential),
+        findings,
+        devices: Kind::ALL.into_iter().filter(|kind| *kind != Kind::Simulated).map(Listed::look).collect(),
+    };
+    Report::of(&machine, machine.whole)
+}
+
+impl Describe for Machine {
+    fn describe(&self, text: &mut Text) {
+        let Self { version, system, architecture, threads, graphics, automatic_backend, findings, devices, .. } = self;
+        text.line(format_args!("haptize {version} on {system} {architecture}"));
+        text.row("CPU threads", threads);
+        graphics.describe(text);
+        text.row(
+            "haptize bake takes",
+            match *automatic_backend {
+                "gpu" if graphics.are_named => "gpu",
+                "gpu" => "gpu; all CPU threads for what they solve in seconds",
+                "cpu" => "cpu, all threads; hardware GPUs for long bakes, where there are any",
+                none => none,
+            },
+        );
+        for Finding { subject, good, seen, remedy, .. } in findings {
+            text.row(*subject, seen);
+            if !good {
+                text.row("", format_args!("-> {remedy}"));
+            }
+        }
+        for (rank, Listed { kind, found, .. }) in devices.iter().enumerate() {
+            let seen = if found.places.is_empty() { "not found".into() } else { found.places.join(", ") };
+            text.row(if rank == 0 { "haptic devices" } else { "" }, format_args!("{kind}: {seen}"));
+            found.missing.iter().for_each(|missing| text.row("", format_args!("-> {missing}")));
+        }
+    }
+}
+
+/// What there is to draw and to compute on.
+#[derive(Serialize)]
 struct Graphics {
     /// Best first.
-    adapters: Vec<AdapterSummary>,
-    /// Whether each solves when `haptize bake` takes GPUs.
-    solves: Vec<bool>,
+    adapters: Vec<Adapter>,
     /// Whether the environment names adapters.
+    #[serde(skip)]
     are_named: bool,
     /// Adapters that the environment names, and this machine does not have.
+    #[serde(skip)]
     missing: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Adapter {
+    #[serde(flatten)]
+    summary: AdapterSummary,
+    /// Whether it solves when `haptize bake` takes GPUs.
+    solves: bool,
 }
 
 impl Graphics {
     fn look() -> Self {
-        let (adapters, names) = (adapters(), named_adapters());
-        let mut taken: Vec<&AdapterSummary> = Vec::new();
-        let mut solves = Vec::new();
-        for adapter in &adapters {
-            let joins = adapter.joins(taken.iter().copied(), !names.is_empty());
-            if joins {
-                taken.push(adapter);
-            }
-            solves.push(joins);
+        let names = named_adapters();
+        let mut found: Vec<Adapter> = Vec::new();
+        for summary in adapters() {
+            let taken = found.iter().filter(|adapter| adapter.solves).map(|adapter| &adapter.summary);
+            let solves = summary.joins(taken, !names.is_empty());
+            found.push(Adapter { summary, solves });
         }
         let are_named = !names.is_empty();
         let missing = names.into_iter().filter(|(_, is_there)| !is_there).map(|(name, _)| name).collect();
-        Self { adapters, solves, are_named, missing }
+        Self { adapters: found, are_named, missing }
     }
 
     /// The backend that `haptize bake` takes by itself for long bakes.
     fn automatic(&self) -> &'static str {
         match () {
             () if !self.missing.is_empty() => "none",
-            () if self.adapters.iter().any(|adapter| adapter.hardware) => "gpu",
+            () if self.adapters.iter().any(|adapter| adapter.summary.hardware) => "gpu",
             () => "cpu",
         }
     }
 
-    fn tell(&self, text: &mut String) -> std::fmt::Result {
-        for (rank, name) in self.missing.iter().enumerate() {
-            writeln!(
-                text,
-                "{:<22} none is called {name:?}, which {ADAPTER_VARIABLE} asks for: set it to parts of names or to \
-                 addresses, with commas between, or unset it to see all",
-                if rank == 0 { "graphics adapters" } else { "" }
-            )?;
+    /// Ranks of those that solve, from one.
+    fn solving(&self) -> Vec<String> {
+        let ranks = self.adapters.iter().enumerate().filter(|(_, adapter)| adapter.solves);
+        ranks.map(|(rank, _)| (rank + 1).to_string()).collect()
+    }
+}
+
+impl Describe for Graphics {
+    fn describe(&self, text: &mut Text) {
+        let Self { adapters, missing, .. } = self;
+        let label = "graphics adapters";
+        if adapters.is_empty() && missing.is_empty() {
+            let none =
+                "none found: `haptize bake --backend gpu` and `haptize view` need a Vulkan driver, nothing else does";
+            return text.row(label, none);
         }
-        if self.adapters.is_empty() && self.missing.is_empty() {
-            return writeln!(
-                text,
-                "graphics adapters      none found: `haptize bake --backend gpu` and `haptize view` need a Vulkan \
-                 driver, nothing else does"
-            );
-        }
-        for (rank, adapter) in self.adapters.iter().enumerate() {
-            let head = if rank == 0 && self.missing.is_empty() { "graphics adapters" } else { "" };
-            let address = if adapter.address.is_empty() { "" } else { " at " };
-            writeln!(text, "{head:<22} {adapter}{address}{}", adapter.address)?;
-        }
-        let solving = match self.solves.iter().filter(|solves| **solves).count() {
+        let remedy = "set it to parts of names or to addresses, with commas between, or unset it to see all";
+        let missing =
+            missing.iter().map(|name| format!("none is called {name:?}, which {ADAPTER_VARIABLE} asks for: {remedy}"));
+        let found = adapters.iter().map(|Adapter { summary, .. }| match summary.address.as_str() {
+            "" => summary.to_string(),
+            address => format!("{summary} at {address}"),
+        });
+        text.rows(label, missing.chain(found));
+        let solving = self.solving();
+        let solving = match solving.len() {
             0 | 1 => "the first is taken".to_owned(),
-            all if all == self.solves.len() => "the first draws, all solve".to_owned(),
-            several => format!("the first draws, {several} solve: {}", self.solving()),
+            all if all == adapters.len() => "the first draws, all solve".to_owned(),
+            several => format!("the first draws, {several} solve: {}", solving.join(", ")),
         };
         let list = "set to parts of names or to addresses, allows only those";
-        writeln!(text, "{:<22} ({solving}; {ADAPTER_VARIABLE}, {list})", "")
-    }
-
-    /// Ranks of those that solve, from one.
-    fn solving(&self) -> String {
-        let ranks = self.solves.iter().enumerate().filter(|(_, solves)| **solves);
-        ranks.map(|(rank, _)| (rank + 1).to_string()).collect::<Vec<_>>().join(", ")
-    }
-
-    fn describe(&self) -> Vec<serde_json::Value> {
-        let pairs = self.adapters.iter().zip(&self.solves);
-        let one = |(adapter, solves): (&AdapterSummary, &bool)| {
-            serde_json::json!({
-                "name": adapter.name,
-                "address": adapter.address,
-                "kind": adapter.kind,
-                "interface": adapter.interface,
-                "driver": adapter.driver,
-                "hardware": adapter.hardware,
-                "solves": solves,
-                "binding_limit_bytes": adapter.binding_limit,
-            })
-        };
-        pairs.map(one).collect()
+        text.row("", format_args!("({solving}; {ADAPTER_VARIABLE}, {list})"));
     }
 }
 

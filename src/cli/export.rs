@@ -1,10 +1,13 @@
 //! `haptize export`: a dataset for other programs.
 
 use super::{
-    Failure, Report,
-    output::{self, Content},
+    Failure,
+    info::describe_absent,
+    output::{self, Content, Replaced},
+    report::{self, Describe, Report, Text},
 };
 use crate::dataset::{Dataset, Format};
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Arguments of `haptize export`.
@@ -31,24 +34,40 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let beside = || arguments.dataset.with_extension(arguments.format.extension());
     let output = arguments.output.clone().unwrap_or_else(beside);
     let inputs = [arguments.dataset.as_path()];
-    let earlier = output::check(&output, Content::Product, inputs)?;
+    let replaced = output::check(&output, Content::Product, inputs)?;
     let beside = arguments.format.beside(&output).filter(|file| file.symlink_metadata().is_ok());
     if let Some(beside) = &beside {
         output::check(beside, Content::Product, inputs)?;
     }
     let files = dataset.export(&output, arguments.format)?;
-    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    let absent = dataset.absent();
-    let mut text: String = names.iter().map(|name| format!("{name}\n")).collect();
-    if !absent.is_empty() {
-        text += &format!("  not there    {}\n", absent.join(", "));
+    let stale = beside.filter(|beside| !files.contains(beside));
+    if let Some(stale) = &stale {
+        std::fs::remove_file(stale).map_err(|error| format!("cannot remove {}: {error}", stale.display()))?;
     }
-    let mut json = serde_json::json!({ "files": names, "absent": absent });
-    earlier.tell(&mut text, &mut json);
-    if let Some(stale) = beside.filter(|beside| !files.contains(beside)) {
-        std::fs::remove_file(&stale).map_err(|error| format!("cannot remove {}: {error}", stale.display()))?;
-        text += &format!("  removed      {}, which an earlier export had left\n", stale.display());
-        json["removed"] = stale.display().to_string().into();
+    let removed = stale.map(|stale| stale.display().to_string());
+    Report::new(&Exported { files: report::names(&files), absent: dataset.absent(), replaced, removed })
+}
+
+/// A dataset for other programs.
+#[derive(Serialize)]
+struct Exported {
+    files: Vec<String>,
+    /// Columns that the dataset does not hold.
+    absent: Vec<&'static str>,
+    #[serde(flatten)]
+    replaced: Option<Replaced>,
+    /// File of an earlier export that was not written again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    removed: Option<String>,
+}
+
+impl Describe for Exported {
+    fn describe(&self, text: &mut Text) {
+        self.files.iter().for_each(|file| text.line(file));
+        describe_absent(text, &self.absent);
+        self.replaced.describe(text);
+        if let Some(removed) = &self.removed {
+            text.row("removed", format_args!("{removed}, which an earlier export had left"));
+        }
     }
-    Ok(Report { text, json, whole: true })
 }

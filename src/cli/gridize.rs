@@ -1,28 +1,30 @@
 //! `haptize gridize`: scattered measurements made a dataset over a uniform grid.
 
 use super::{
-    Failure, Report,
+    Failure,
     bar::Bar,
-    output::{self, Content, Folder},
+    output::{self, Content, Folder, Overwritten, Replaced},
+    report::{self, Describe, Report, Text},
+    watch,
 };
 use crate::{
     MAX_JOINTS,
     csv::TableError,
-    dataset::Dataset,
+    dataset::{Axis, Dataset},
     gridize::{
         GridizeOptions, GridizeReport, Interpolation, Samples, gridize,
         prediction::{Prediction, held_out, predict},
     },
     input,
     logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
-    report::{self, gridized::gridized, hysteresis::hysteresis},
+    report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
     scan::{RowStatus, ScanLog},
     scene::{Rendering, ScanScene},
 };
+use serde::Serialize;
 use std::{
-    fmt::{self, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Instant, SystemTime},
 };
 
@@ -80,7 +82,7 @@ pub struct Arguments {
     figures: Option<PathBuf>,
 }
 
-/// Figures beside [`report::FIGURES`].
+/// Figures beside [`FELT`].
 const FIGURES: [&str; 4] = ["gridized.svg", "gridized.png", "hysteresis.svg", "hysteresis.png"];
 
 /// The measurements that were read.
@@ -117,8 +119,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let output = output(arguments)?;
     let inputs = arguments.logs.iter().chain(&arguments.against).chain(&arguments.columns).chain(&arguments.scene);
     let inputs = inputs.map(PathBuf::as_path);
-    let earlier = output::check(&output, Content::Dataset, inputs.clone())?;
-    let names = report::FIGURES.into_iter().chain(FIGURES);
+    let replaced = output::check(&output, Content::Dataset, inputs.clone())?;
+    let names = FELT.into_iter().chain(FIGURES);
     let folder = arguments.figures.as_ref().map(|folder| Folder::check(folder, names, inputs)).transpose()?;
     if let Some(folder) = &folder {
         folder.keep_apart(&output)?;
@@ -153,47 +155,60 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     dataset.save(&output)?;
     let figures = figures(arguments, &source, &dataset)?;
-    let seconds = started.elapsed().as_secs_f64();
-    let mut json = serde_json::to_value(&report)?;
-    json["file"] = output.display().to_string().into();
-    json["source"] = source.kind.into();
-    json["seconds"] = seconds.into();
-    json["import"] = serde_json::to_value(&source.import)?;
-    json["left_out"] = source.left_out.into();
-    json["held_out"] = serde_json::to_value(&held_out)?;
-    json["against"] = serde_json::to_value(&against)?;
-    json["figures"] = figures.iter().map(|file| file.display().to_string()).collect();
-    let mut text = String::new();
-    writeln!(
-        text,
-        "{}: {} grid points of {} inside the measured region",
-        output.display(),
-        report.inside,
-        report.points
-    )?;
-    describe(&mut text, &source, &dataset, &report)?;
-    for (what, prediction) in [("held out", &held_out), ("against", &against)] {
-        if let Some(prediction) = prediction {
-            describe_prediction(&mut text, what, &source, &dataset, prediction)?;
-        }
-    }
-    if let Some(folder) = &arguments.figures {
-        writeln!(text, "  figures      {} files in {}", figures.len(), folder.display())?;
-    }
-    writeln!(text, "  {seconds:.2} s, of these {reading:.2} s for reading")?;
-    earlier.tell(&mut text, &mut json);
-    if let Some(folder) = folder {
-        folder.close(&figures, &mut text, &mut json["folder"])?;
-    }
-    Ok(Report { text, json, whole: true })
+    let gridized = Gridized {
+        report,
+        file: output.display().to_string(),
+        source: source.kind,
+        seconds: started.elapsed().as_secs_f64(),
+        import: source.import,
+        left_out: source.left_out,
+        held_out,
+        against,
+        folder: folder.map(|folder| folder.close(&figures)).transpose()?,
+        figures: report::names(&figures),
+        replaced,
+        reading,
+        of: source.of,
+        axes: dataset.grid.axes,
+    };
+    Report::new(&gridized)
+}
+
+/// Measurements made a dataset.
+#[derive(Serialize)]
+struct Gridized {
+    #[serde(flatten)]
+    report: GridizeReport,
+    file: String,
+    /// `scan`, `simulated scan` or `import`.
+    source: &'static str,
+    /// Wall time, and the part of it for reading (s).
+    seconds: f64,
+    #[serde(skip)]
+    reading: f64,
+    import: Option<ImportReport>,
+    /// Rows of the log that were not used.
+    left_out: usize,
+    held_out: Option<Prediction>,
+    against: Option<Prediction>,
+    figures: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    folder: Option<Overwritten>,
+    #[serde(flatten)]
+    replaced: Option<Replaced>,
+    /// What was measured.
+    #[serde(skip)]
+    of: String,
+    #[serde(skip)]
+    axes: Vec<Axis>,
 }
 
 fn figures(arguments: &Arguments, source: &Source, dataset: &Dataset) -> Result<Vec<PathBuf>, Failure> {
     let Some(folder) = &arguments.figures else { return Ok(Vec::new()) };
-    let mut files = report::write_figures(folder, dataset, None)?;
-    files.extend(report::write_both(folder, "gridized", &gridized(&source.samples, dataset))?);
+    let mut files = write_figures(folder, dataset, None)?;
+    files.extend(write_both(folder, "gridized", &gridized(&source.samples, dataset))?);
     if let Some(([forward, backward], lead)) = &source.branches {
-        files.extend(report::write_both(folder, "hysteresis", &hysteresis(forward, backward, *lead))?);
+        files.extend(write_both(folder, "hysteresis", &hysteresis(forward, backward, *lead))?);
     }
     Ok(files)
 }
@@ -297,59 +312,53 @@ fn scene(path: &PathBuf, joints: usize) -> Result<String, Failure> {
     Ok(scene.text)
 }
 
-fn describe(text: &mut String, source: &Source, dataset: &Dataset, report: &GridizeReport) -> fmt::Result {
-    writeln!(text, "  made from    {} samples ({}: {})", report.samples, source.kind, source.of)?;
-    if report.merged > 0 {
-        writeln!(text, "  merged       {} samples at the same configuration as another", report.merged)?;
-    }
-    writeln!(text, "  in contact   {} points, torque above {:.4}", report.contact_points, report.epsilon)?;
-    if source.left_out > 0 {
-        let rows = if source.left_out == 1 { "row" } else { "rows" };
-        writeln!(text, "  left out     {} {rows}", source.left_out)?;
-    }
-    for dropped in source.import.iter().flat_map(|import| &import.dropped) {
-        writeln!(text, "               {dropped}")?;
-    }
-    let Some(import) = &source.import else { return Ok(()) };
-    writeln!(text, "  rows         {} read, {} gaps in time", import.rows, import.gaps)?;
-    let Some(cells) = &import.cells else { return Ok(()) };
-    writeln!(text, "  cells        {} visited, {} of them in both directions", cells.cells, cells.both_directions)?;
-    for (axis, (hysteresis, repeatability)) in
-        dataset.grid.axes.iter().zip(cells.hysteresis.iter().zip(&cells.repeatability))
-    {
-        let unit = axis.effort_unit();
-        writeln!(
-            text,
-            "  {:<12} hysteresis +-{hysteresis:.4} {unit}, repeatability {repeatability:.4} {unit}",
-            axis.name
-        )?;
-    }
-    Ok(())
-}
-
-fn describe_prediction(
-    text: &mut String,
-    what: &str,
-    source: &Source,
-    dataset: &Dataset,
-    prediction: &Prediction,
-) -> fmt::Result {
-    let Prediction { samples, predicted, rms, worst, deviation } = prediction;
-    writeln!(text, "  {what:<12} {samples} samples, {predicted} of them inside the grid and predicted")?;
-    if *predicted == 0 {
-        return Ok(());
-    }
-    let cells = source.import.as_ref().and_then(|import| import.cells.as_ref());
-    for (joint, axis) in dataset.grid.axes.iter().enumerate() {
-        let (name, unit) = (&axis.name, axis.effort_unit());
-        write!(text, "  {name:<12} to {:.4} {unit} rms, {:.4} at worst", rms[joint], worst[joint])?;
-        if let Some(deviation) = deviation {
-            write!(text, "; their own standard deviation {:.4}", deviation[joint])?;
+impl Describe for Gridized {
+    fn describe(&self, text: &mut Text) {
+        let Self { file, source, of, seconds, reading, import, left_out, .. } = self;
+        let GridizeReport { samples, merged, points, inside, contact_points, epsilon, .. } = &self.report;
+        text.line(format_args!("{file}: {inside} grid points of {points} inside the measured region"));
+        text.row("made from", format_args!("{samples} samples ({source}: {of})"));
+        if *merged > 0 {
+            text.row("merged", format_args!("{merged} samples at the same configuration as another"));
         }
+        text.row("in contact", format_args!("{contact_points} points, torque above {epsilon:.4}"));
+        if *left_out > 0 {
+            text.row("left out", watch::counted(*left_out, ["row", "rows"]));
+        }
+        import.iter().flat_map(|import| &import.dropped).for_each(|dropped| text.row("", dropped));
+        if let Some(import) = import {
+            text.row("rows", format_args!("{} read, {} gaps in time", import.rows, import.gaps));
+        }
+        let cells = import.as_ref().and_then(|import| import.cells.as_ref());
         if let Some(cells) = cells {
-            write!(text, ", repeatability {:.4}", cells.repeatability[joint])?;
+            let (visited, both) = (cells.cells, cells.both_directions);
+            text.row("cells", format_args!("{visited} visited, {both} of them in both directions"));
+            for (axis, (hysteresis, repeatability)) in
+                self.axes.iter().zip(cells.hysteresis.iter().zip(&cells.repeatability))
+            {
+                let unit = axis.effort_unit();
+                text.row(
+                    &axis.name,
+                    format_args!("hysteresis +-{hysteresis:.4} {unit}, repeatability {repeatability:.4} {unit}"),
+                );
+            }
         }
-        writeln!(text)?;
+        for (what, prediction) in [("held out", &self.held_out), ("against", &self.against)] {
+            let Some(Prediction { samples, predicted, rms, worst, deviation }) = prediction else { continue };
+            text.row(what, format_args!("{samples} samples, {predicted} of them inside the grid and predicted"));
+            for (joint, axis) in self.axes.iter().enumerate().filter(|_| *predicted > 0) {
+                let own = deviation.as_ref().map(|own| format!("; their own standard deviation {:.4}", own[joint]));
+                let repeated = cells.map(|cells| format!(", repeatability {:.4}", cells.repeatability[joint]));
+                let beside: String = own.into_iter().chain(repeated).collect();
+                let (rms, worst, unit) = (rms[joint], worst[joint], axis.effort_unit());
+                text.row(&axis.name, format_args!("to {rms:.4} {unit} rms, {worst:.4} at worst{beside}"));
+            }
+        }
+        if let Some(folder) = self.figures.first().and_then(|figure| Path::new(figure).parent()) {
+            text.row("figures", format_args!("{} files in {}", self.figures.len(), folder.display()));
+        }
+        text.row("time", format_args!("{seconds:.2} s, of these {reading:.2} s for reading"));
+        self.replaced.describe(text);
+        self.folder.describe(text);
     }
-    Ok(())
 }

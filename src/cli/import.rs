@@ -1,10 +1,14 @@
 //! `haptize import`: a robot's file becomes a scene.
 
-use super::{Failure, Report, shell, tell};
+use super::{
+    Failure,
+    report::{Describe, Report, Text},
+    shell, tell,
+};
 use crate::names::escaped;
-use crate::urdf::{self, Arm, Lock, Robot};
+use crate::urdf::{self, Arm, ArmJoint, Lock, Robot};
+use serde::{Serialize, Serializer};
 use std::{
-    fmt::Write as _,
     fs::OpenOptions,
     io::{ErrorKind, Write as _},
     path::{Path, PathBuf},
@@ -65,32 +69,38 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         .map(|note| format!("{}:{}: {}", arguments.robot.display(), note.line, note.message))
         .collect();
     notes.iter().for_each(|note| tell(format_args!("haptize: {note}")));
-    let mut text = String::new();
-    let counts: Vec<usize> = nodes.of_joints.iter().map(Vec::len).collect();
-    writeln!(
-        text,
-        "{}: {} joints, {} contact nodes",
-        output.display(),
-        arm.joints.len(),
-        counts.iter().sum::<usize>()
-    )?;
-    for (joint, count) in arm.joints.iter().zip(&counts) {
-        let [lower, upper] = joint.limits;
-        writeln!(
-            text,
-            "  {:<24} {:9} {lower:8.3} to {upper:.3}, {count} nodes",
-            joint.name,
-            format!("{:?}", joint.kind).to_lowercase()
-        )?;
+    let nodes: Vec<usize> = nodes.of_joints.iter().map(Vec::len).collect();
+    Report::new(&Imported { file: output.display().to_string(), joints: arm.joints, nodes, notes })
+}
+
+/// A scene made of a robot.
+#[derive(Serialize)]
+struct Imported {
+    file: String,
+    #[serde(serialize_with = "names")]
+    joints: Vec<ArmJoint>,
+    /// Contact nodes of each joint's link.
+    nodes: Vec<usize>,
+    /// What the robot's file lacks.
+    notes: Vec<String>,
+}
+
+/// Writes joints as their names.
+fn names<S: Serializer>(joints: &[ArmJoint], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(joints.iter().map(|joint| &joint.name))
+}
+
+impl Describe for Imported {
+    fn describe(&self, text: &mut Text) {
+        let Self { file, joints, nodes, .. } = self;
+        let all: usize = nodes.iter().sum();
+        text.line(format_args!("{file}: {} joints, {all} contact nodes", joints.len()));
+        for (joint, count) in joints.iter().zip(nodes) {
+            let ([lower, upper], kind) = (joint.limits, format!("{:?}", joint.kind).to_lowercase());
+            text.row(&joint.name, format_args!("{kind:9} {lower:8.3} to {upper:.3}, {count} nodes"));
+        }
+        text.row("next", format_args!("haptize bake {}", shell::file(Path::new(file))));
     }
-    writeln!(text, "  next         haptize bake {}", shell::file(&output))?;
-    let json = serde_json::json!({
-        "file": output.display().to_string(),
-        "joints": arm.joints.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>(),
-        "nodes": counts,
-        "notes": notes,
-    });
-    Ok(Report { text, json, whole: true })
 }
 
 /// The command line again, for the head of the scene; files without their folders.

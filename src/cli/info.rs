@@ -1,18 +1,19 @@
 //! `haptize info`: what a dataset holds. The whole file is checked first.
 
-use super::{Failure, Report};
+use super::{
+    Failure,
+    baked::describe_error,
+    report::{Describe, Report, Text},
+};
 use crate::{
-    contact::MeshRipple,
-    dataset::{Axis, Dataset, MeasuredError, Refinement, Summary},
+    dataset::{Axis, Dataset, Provenance, Refinement, StatusCounts, Summary},
     names::escaped,
     object::Skin,
     scene::{Material, ObjectSpec, Rendering, SkinSpec},
 };
 use glam::DVec3;
-use std::{
-    fmt::{self, Write},
-    path::PathBuf,
-};
+use serde::Serialize;
+use std::path::PathBuf;
 
 /// Arguments of `haptize info`.
 #[derive(clap::Args)]
@@ -25,33 +26,56 @@ pub struct Arguments {
     dataset: PathBuf,
 }
 
+/// What a dataset holds.
+#[derive(Serialize)]
+struct Info {
+    #[serde(flatten)]
+    summary: Summary,
+    file: String,
+    file_bytes: u64,
+    /// Columns that it does not hold.
+    absent: Vec<&'static str>,
+    /// Why its scene does not describe it.
+    contradiction: Option<String>,
+    #[serde(flatten)]
+    body: Body,
+}
+
 /// Opens and checks the file, and sums it up.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let path = &arguments.dataset;
     let dataset = Dataset::open(path)?;
-    let summary = dataset.summary();
-    let file_bytes = std::fs::metadata(path)?.len();
-    let mut json = serde_json::to_value(&summary)?;
-    json["file"] = path.display().to_string().into();
-    json["file_bytes"] = file_bytes.into();
-    json["absent"] = dataset.absent().into();
-    let contradiction = dataset.check_scene().err();
-    json["contradiction"] = contradiction.clone().into();
-    let mut text = String::new();
-    let state = if contradiction.is_some() { "intact" } else { "sound" };
-    writeln!(text, "{}: {} points, {:.1} MB, {state}", path.display(), summary.points, file_bytes as f64 / 1e6)?;
-    if let Some(contradiction) = &contradiction {
-        writeln!(text, "  scene        does not describe this dataset: {contradiction}")?;
-        writeln!(text, "               no command but info and export takes it: bake the scene again")?;
-    }
-    describe(&mut text, &summary, &dataset.absent())?;
     let spec = Rendering::parse(&dataset.scene, "scene").ok().and_then(|scene| scene.object);
-    write_inclusions(&mut text, &mut json, &spec.as_ref().map_or_else(Vec::new, inclusions))?;
-    if let Some(skin) = spec.and_then(|spec| skin(&dataset, spec.skin?)) {
-        json["skin"] = serde_json::to_value(skin)?;
-        writeln!(text, "  skin         {skin}")?;
+    let info = Info {
+        summary: dataset.summary(),
+        file: path.display().to_string(),
+        file_bytes: std::fs::metadata(path)?.len(),
+        absent: dataset.absent(),
+        contradiction: dataset.check_scene().err(),
+        body: spec.map_or_else(Body::default, |spec| Body {
+            inclusions: inclusions(&spec),
+            skin: spec.skin.and_then(|skin| skin_on(&dataset, skin)),
+        }),
+    };
+    Report::of(&info, info.contradiction.is_none())
+}
+
+/// What an object consists of, beside its surface and material.
+#[derive(Default, Serialize)]
+pub struct Body {
+    /// Inclusions, one description each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inclusions: Vec<String>,
+    /// The skin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub skin: Option<Skin>,
+}
+
+impl Describe for Body {
+    fn describe(&self, text: &mut Text) {
+        self.inclusions.iter().for_each(|inclusion| text.row("inclusion", inclusion));
+        self.skin.iter().for_each(|skin| text.row("skin", skin));
     }
-    Ok(Report { text, json, whole: contradiction.is_none() })
 }
 
 /// Returns the inclusions of the object, one description each.
@@ -62,104 +86,91 @@ pub fn inclusions(object: &ObjectSpec) -> Vec<String> {
     }
 }
 
-/// Writes these, for people and for programs.
-pub fn write_inclusions(text: &mut String, json: &mut serde_json::Value, inclusions: &[String]) -> fmt::Result {
-    if !inclusions.is_empty() {
-        json["inclusions"] = inclusions.into();
-    }
-    inclusions.iter().try_for_each(|inclusion| writeln!(text, "  inclusion    {inclusion}"))
-}
-
 /// The skin `spec` on the dataset's surface.
-fn skin(dataset: &Dataset, spec: SkinSpec) -> Option<Skin> {
+fn skin_on(dataset: &Dataset, spec: SkinSpec) -> Option<Skin> {
     let surface = dataset.surface.as_ref()?;
     let nodes: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
     let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     Some(Skin::new(spec, &nodes, &triangles))
 }
 
-fn describe(text: &mut String, summary: &Summary, absent: &[&str]) -> fmt::Result {
-    for (axis, [least, greatest]) in summary.axes.iter().zip(&summary.torque) {
-        let Axis { name, unit, start, step, count } = axis;
-        let last = axis.coordinate(count - 1);
-        let effort = axis.effort_unit();
-        writeln!(text, "  {name:<12} {count} lines, {start:.4} to {last:.4} {unit} by {step:.4}")?;
-        writeln!(text, "  {:<12} {least:.4} to {greatest:.4} {effort}", "")?;
+impl Describe for Info {
+    fn describe(&self, text: &mut Text) {
+        let Self { summary, file, file_bytes, absent, contradiction, body } = self;
+        let (points, size) = (summary.points, *file_bytes as f64 / 1e6);
+        let state = if contradiction.is_some() { "intact" } else { "sound" };
+        text.line(format_args!("{file}: {points} points, {size:.1} MB, {state}"));
+        if let Some(contradiction) = contradiction {
+            text.row("scene", format_args!("does not describe this dataset: {contradiction}"));
+            text.row("", "no command but info and export takes it: bake the scene again");
+        }
+        summary.describe(text);
+        describe_absent(text, absent);
+        summary.provenance.describe(text);
+        body.describe(text);
     }
-    if let Some(Refinement { nodes, bytes }) = &summary.refinement {
-        let nodes: Vec<String> = nodes.iter().map(ToString::to_string).collect();
-        writeln!(text, "  refined      {} nodes by level, {:.1} MB in memory", nodes.join(" + "), *bytes as f64 / 1e6)?;
-    }
-    let counts = &summary.statuses;
-    write!(text, "  status       {} free, {} in contact", counts.free, counts.contact)?;
-    for (count, word) in
-        [(counts.unconverged, "unconverged"), (counts.overflow, "overflowed"), (counts.outside, "outside")]
-    {
-        if count > 0 {
-            write!(text, ", {count} {word}")?;
+}
+
+impl Describe for Summary {
+    fn describe(&self, text: &mut Text) {
+        for (axis, [least, greatest]) in self.axes.iter().zip(&self.torque) {
+            let Axis { name, unit, start, step, count } = axis;
+            let last = axis.coordinate(count - 1);
+            let effort = axis.effort_unit();
+            text.row(name, format_args!("{count} lines, {start:.4} to {last:.4} {unit} by {step:.4}"));
+            text.row("", format_args!("{least:.4} to {greatest:.4} {effort}"));
+        }
+        if let Some(Refinement { nodes, bytes }) = &self.refinement {
+            let nodes: Vec<String> = nodes.iter().map(ToString::to_string).collect();
+            let memory = *bytes as f64 / 1e6;
+            text.row("refined", format_args!("{} nodes by level, {memory:.1} MB in memory", nodes.join(" + ")));
+        }
+        let StatusCounts { free, contact, unconverged, overflow, outside } = self.statuses;
+        let others = [(unconverged, "unconverged"), (overflow, "overflowed"), (outside, "outside")];
+        let others = others.iter().filter(|(count, _)| *count > 0).map(|(count, word)| format!(", {count} {word}"));
+        text.row("status", format_args!("{free} free, {contact} in contact{}", others.collect::<String>()));
+        if let (Some(contacts), Some(most), Some(force)) = (self.contacts, self.max_contacts, self.max_force) {
+            text.row(
+                "contacts",
+                format_args!("{contacts} forces, at most {most} at a point and {force:.4} N on a node"),
+            );
+        }
+        if let Some(depth) = self.max_depth {
+            text.row("depth", format_args!("at most {:.3} mm below the surface at rest", depth * 1e3));
+        }
+        if let Some(energy) = self.max_energy {
+            text.row("energy", format_args!("at most {energy:.5} J"));
+        }
+        if let Some(residual) = self.max_residual {
+            text.row("residual", format_args!("at most {residual:.1e} where converged"));
+        }
+        if let Some([nodes, triangles]) = self.surface {
+            text.row("surface", format_args!("{nodes} nodes, {triangles} triangles"));
         }
     }
-    writeln!(text)?;
-    if let (Some(contacts), Some(most), Some(force)) = (summary.contacts, summary.max_contacts, summary.max_force) {
-        writeln!(text, "  contacts     {contacts} forces, at most {most} at a point and {force:.4} N on a node")?;
-    }
-    if let Some(depth) = summary.max_depth {
-        writeln!(text, "  depth        at most {:.3} mm below the surface at rest", depth * 1e3)?;
-    }
-    if let Some(energy) = summary.max_energy {
-        writeln!(text, "  energy       at most {energy:.5} J")?;
-    }
-    if let Some(residual) = summary.max_residual {
-        writeln!(text, "  residual     at most {residual:.1e} where converged")?;
-    }
-    if let Some([nodes, triangles]) = summary.surface {
-        writeln!(text, "  surface      {nodes} nodes, {triangles} triangles")?;
-    }
+}
+
+/// Describes which columns a dataset does not hold.
+pub fn describe_absent(text: &mut Text, absent: &[&str]) {
     if !absent.is_empty() {
-        writeln!(text, "  not there    {}", absent.join(", "))?;
+        text.row("not there", absent.join(", "));
     }
-    let from = &summary.provenance;
-    mesh_ripple(text, from.mesh_ripple)?;
-    error(text, from.error.as_ref(), from.aim)?;
-    let [date, version, algorithm, backend, adapter] =
-        [&from.date, &from.version, &from.algorithm, &from.backend, &from.adapter].map(|text| escaped(text));
-    write!(text, "  made         {date} by haptize {version}: {algorithm}")?;
-    // Measured torques were not solved for: they have no residual.
-    if from.tolerance > 0.0 {
-        write!(text, " to {:.0e}", from.tolerance)?;
-    }
-    writeln!(text, " on {backend} ({adapter})")?;
-    notices(text, &from.notices)
 }
 
-/// Writes what the user of a dataset should know, a line each.
-pub fn notices(text: &mut String, notices: &[String]) -> fmt::Result {
-    notices.iter().try_for_each(|notice| writeln!(text, "  notice       {}", escaped(notice)))
+impl Describe for Provenance {
+    fn describe(&self, text: &mut Text) {
+        self.mesh_ripple.describe(text);
+        describe_error(text, self.error.as_ref(), self.aim);
+        let [date, version, algorithm, backend, adapter] =
+            [&self.date, &self.version, &self.algorithm, &self.backend, &self.adapter].map(|text| escaped(text));
+        // Measured torques were not solved for: they have no residual.
+        let residual = if self.tolerance > 0.0 { format!(" to {:.0e}", self.tolerance) } else { String::new() };
+        text.row("made", format_args!("{date} by haptize {version}: {algorithm}{residual} on {backend} ({adapter})"));
+        describe_notices(text, &self.notices);
+    }
 }
 
-/// Writes how much a contact point feels the mesh, and what to do about it.
-pub fn mesh_ripple(text: &mut String, ripple: Option<MeshRipple>) -> fmt::Result {
-    let Some(ripple) = ripple else { return Ok(()) };
-    writeln!(text, "  mesh ripple  {ripple}")?;
-    ripple.remedy().map_or(Ok(()), |remedy| writeln!(text, "  {:<12} {remedy}", ""))
-}
-
-/// The error that the bake measured, and the one that its grid was chosen for.
-pub fn error(text: &mut String, measured: Option<&MeasuredError>, aim: Option<f64>) -> fmt::Result {
-    let Some(measured) = measured else { return writeln!(text, "  error        not measured") };
-    for (number, line) in measured.lines().iter().enumerate() {
-        writeln!(text, "  {:<12} {line}", if number == 0 { "error" } else { "" })?;
-    }
-    let MeasuredError { configurations, left_out, torque, unit, .. } = measured;
-    if *configurations == 0 {
-        return Ok(());
-    }
-    write!(text, "  {:<12} of the rms torque, {torque:.4} {unit}, at {configurations} random configurations", "")?;
-    if *left_out > 0 {
-        write!(text, "; {left_out} left out, which did not converge")?;
-    }
-    writeln!(text)?;
-    let Some(aim) = aim else { return Ok(()) };
-    let verdict = if measured.keeps(aim) { "kept" } else { "missed" };
-    writeln!(text, "  {:<12} asked for: {:.2} % rms, {verdict}", "", 100.0 * aim)
+/// Describes what the user of a dataset should know.
+pub fn describe_notices(text: &mut Text, notices: &[String]) {
+    notices.iter().for_each(|notice| text.row("notice", escaped(notice)));
 }

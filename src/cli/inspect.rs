@@ -1,22 +1,24 @@
 //! `haptize inspect`: one configuration in full.
 
-use super::{Failure, Report, info, tell};
+use super::{
+    Failure,
+    info::{self, Body},
+    report::{Describe, Report, Text},
+    tell,
+};
 use crate::{
     JointVector,
-    contact::Model,
+    contact::{Model, NodeForce},
     dataset::{self, Dataset},
     field::TorqueField,
-    object::Object,
+    object::{LatticeError, Object},
     proxy::Chain,
-    scene::{self, Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, Scene},
+    scene::{self, AxisSpec, GRID_STEP_SLACK, GridSpec, HapticsSpec, Interpolation, Scene},
     sweep::{Inspection, build_object},
 };
-use clap::ValueEnum;
 use glam::DVec3;
-use std::{
-    fmt::{self, Write},
-    path::{Path, PathBuf},
-};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `haptize inspect`.
 #[derive(clap::Args)]
@@ -90,53 +92,89 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let warnings = outside(&chain, &scene.grid, q);
     warnings.iter().for_each(|warning| tell(format_args!("haptize: note: {warning}")));
     let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(q)])?;
-    let inspection = Inspection::new(&model, q);
-    let mut json = serde_json::to_value(&inspection)?;
-    json["warnings"] = warnings.into();
-    let mut text = String::new();
-    describe(&mut text, &inspection, &chain)?;
     object.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
-    json["object_warnings"] = object.warnings.clone().into();
-    let inclusions = info::inclusions(&scene.object);
-    info::write_inclusions(&mut text, &mut json, &inclusions)?;
-    if let Some(skin) = object.skin {
-        json["skin"] = serde_json::to_value(skin)?;
-        writeln!(text, "  skin         {skin}")?;
+    let dataset = dataset.as_ref();
+    let solved = Inspection::new(&model, q);
+    let inspected = Inspected {
+        interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
+        stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
+        lattice: object.lattice_error(&scene.object, &model.compliance),
+        solved,
+        warnings,
+        body: Body { inclusions: info::inclusions(&scene.object), skin: object.skin },
+        object_warnings: object.warnings,
+        joints: chain.joints.iter().map(|joint| (joint.name.clone(), joint.kind.unit())).collect(),
+    };
+    Report::new(&inspected)
+}
+
+/// One configuration in full.
+#[derive(Serialize)]
+struct Inspected {
+    #[serde(flatten)]
+    solved: Inspection,
+    warnings: Vec<String>,
+    object_warnings: Vec<String>,
+    #[serde(flatten)]
+    body: Body,
+    /// Where a lattice fills the object: the error that it makes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lattice: Option<LatticeError>,
+    /// Where there is a dataset: what it answers here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interpolated: Option<Interpolated>,
+    /// What it stores at the nearest grid point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stored: Option<Stored>,
+    /// Name of each joint, and unit of its coordinate.
+    #[serde(skip)]
+    joints: Vec<(String, &'static str)>,
+}
+
+/// What a dataset answers at a configuration.
+#[derive(Serialize)]
+struct Interpolated {
+    interpolation: Interpolation,
+    torque: Vec<f64>,
+    contact: bool,
+    /// Torque less the solved one.
+    difference: Vec<f64>,
+}
+
+impl Interpolated {
+    fn new(dataset: &Dataset, haptics: &HapticsSpec, solved: &Inspection) -> Result<Self, Failure> {
+        let interpolation = haptics.interpolation;
+        let field = TorqueField::interpolated(dataset, interpolation, haptics.threshold, &haptics.boundary_slope)?;
+        let sample = field.sample(&solved.q);
+        let difference = sample.torque.iter().zip(&solved.torque).map(|(felt, solved)| felt - solved).collect();
+        Ok(Self { interpolation, torque: sample.torque.to_vec(), contact: sample.contact, difference })
     }
-    if let Some(error) = object.lattice_error(&scene.object, &model.compliance) {
-        json["lattice"] = serde_json::to_value(error)?;
-        writeln!(text, "  lattice      {error}")?;
+}
+
+/// What a dataset stores at a grid point.
+#[derive(Serialize)]
+struct Stored {
+    point: usize,
+    q: Vec<f64>,
+    status: String,
+    torque: Vec<f64>,
+    forces: Vec<NodeForce>,
+    #[serde(skip)]
+    notices: Vec<String>,
+}
+
+impl Stored {
+    fn new(dataset: &Dataset, q: &[f64]) -> Option<Self> {
+        let point = dataset.grid.nearest(q)?;
+        Some(Self {
+            point,
+            q: dataset.grid.configuration(point).to_vec(),
+            status: format!("{:?}", dataset.status(point)).to_lowercase(),
+            torque: dataset.torque(point).to_vec(),
+            forces: dataset.forces(point).collect(),
+            notices: dataset.provenance.notices.clone(),
+        })
     }
-    if let Some(dataset) = &dataset {
-        let haptics = &scene.haptics;
-        let field =
-            TorqueField::interpolated(dataset, haptics.interpolation, haptics.threshold, &haptics.boundary_slope)?;
-        let sample = field.sample(q);
-        let difference: Vec<f64> =
-            sample.torque.iter().zip(&inspection.torque).map(|(felt, solved)| felt - solved).collect();
-        json["interpolated"] = serde_json::json!({
-            "interpolation": haptics.interpolation, "torque": *sample.torque, "contact": sample.contact,
-            "difference": difference,
-        });
-        writeln!(text, "the dataset, interpolated here ({}):", haptics.interpolation.name())?;
-        writeln!(text, "  torque       {}", efforts(&sample.torque, &chain))?;
-        writeln!(text, "  difference   {} from what is solved", efforts(&difference, &chain))?;
-    }
-    if let Some(point) = dataset.as_ref().and_then(|dataset| dataset.grid.nearest(q).map(|point| (dataset, point))) {
-        let (dataset, point) = point;
-        let stored = dataset.grid.configuration(point);
-        let status = format!("{:?}", dataset.status(point)).to_lowercase();
-        json["stored"] = serde_json::json!({
-            "point": point, "q": *stored, "status": status, "torque": dataset.torque(point),
-            "forces": dataset.forces(point)
-                .map(|f| serde_json::json!({"node": f.node, "force": f.force}))
-                .collect::<Vec<_>>(),
-        });
-        writeln!(text, "stored at point {point}, q = {}: {status}", numbers(&stored))?;
-        writeln!(text, "  torque       {}", efforts(dataset.torque(point), &chain))?;
-        info::notices(&mut text, &dataset.provenance.notices)?;
-    }
-    Ok(Report { text, json, whole: true })
 }
 
 /// The scene and its object, from either kind of file. A dataset holds both: neither scene nor mesh file is needed.
@@ -158,15 +196,9 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
         .into());
     };
     let wrong = |why: String| format!("{}: the scene in the dataset: {why}", path.display());
-    let mut scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(error.to_string()))?;
+    let law = &dataset.provenance.algorithm;
+    let scene = Scene::of_dataset(&dataset.scene, "scene", law).map_err(|error| wrong(error.to_string()))?;
     dataset.check_scene().map_err(wrong)?;
-    let algorithm = &dataset.provenance.algorithm;
-    scene.contact.algorithm = Algorithm::from_str(algorithm, true).map_err(|_| {
-        wrong(format!(
-            "it was solved by the algorithm `{}`, which is no more: bake it anew",
-            crate::names::escaped(algorithm)
-        ))
-    })?;
     let object = surface.object(&scene.object)?;
     Ok((scene, object, Some(dataset)))
 }
@@ -190,40 +222,50 @@ fn outside(chain: &Chain, grid: &GridSpec, q: &[f64]) -> Vec<String> {
     found
 }
 
-fn describe(text: &mut String, inspection: &Inspection, chain: &Chain) -> fmt::Result {
-    let Inspection { q, status, iterations, residual, energy, gap, torque, proxy_nodes, object_nodes } = inspection;
-    writeln!(text, "q = {}: {status}", numbers(q))?;
-    writeln!(text, "  torque       {}", efforts(torque, chain))?;
-    writeln!(text, "  energy       {energy:.6} J")?;
-    writeln!(text, "  gap          {:.3} mm to the surface at rest", gap * 1e3)?;
-    writeln!(text, "  solved       in {iterations} iterations to a residual of {residual:.1e}")?;
-    let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
-    writeln!(
-        text,
-        "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {untouched} others are \
-         free"
-    )?;
-    for (number, node) in proxy_nodes.iter().enumerate() {
-        let Some(contact) = &node.contact else { continue };
-        writeln!(text, "  {number:<3} {:<10} {}", node.link, numbers(&node.position.to_array()))?;
-        let shown = contact.nodes.iter().zip(&contact.weights).filter(|(_, weight)| weight.abs() >= LEAST_WEIGHT);
-        let carriers = shown.map(|(node, weight)| format!("{node} ({weight:.3})")).collect::<Vec<_>>().join(" ");
-        writeln!(text, "      force {} on {carriers}", numbers(&contact.force.to_array()))?;
-        let columns: Vec<_> = node.jacobian.iter().map(|column| numbers(&column.to_array())).collect();
-        writeln!(text, "      J     {}", columns.join("  "))?;
+impl Describe for Inspected {
+    fn describe(&self, text: &mut Text) {
+        let Inspection { q, status, iterations, residual, energy, gap, torque, .. } = &self.solved;
+        let Inspection { proxy_nodes, object_nodes, .. } = &self.solved;
+        let efforts =
+            |values: &[f64]| scene::efforts(values, self.joints.iter().map(|(name, unit)| (name.as_str(), *unit)));
+        text.line(format_args!("q = {}: {status}", numbers(q)));
+        text.row("torque", efforts(torque));
+        text.row("energy", format_args!("{energy:.6} J"));
+        text.row("gap", format_args!("{:.3} mm to the surface at rest", gap * 1e3));
+        text.row("solved", format_args!("in {iterations} iterations to a residual of {residual:.1e}"));
+        let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
+        text.line(format_args!(
+            "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {untouched} others \
+             are free"
+        ));
+        for (number, node) in proxy_nodes.iter().enumerate() {
+            let Some(contact) = &node.contact else { continue };
+            text.line(format_args!("  {number:<3} {:<10} {}", node.link, numbers(&node.position.to_array())));
+            let shown = contact.nodes.iter().zip(&contact.weights).filter(|(_, weight)| weight.abs() >= LEAST_WEIGHT);
+            let carriers = shown.map(|(node, weight)| format!("{node} ({weight:.3})")).collect::<Vec<_>>().join(" ");
+            text.line(format_args!("      force {} on {carriers}", numbers(&contact.force.to_array())));
+            let columns: Vec<_> = node.jacobian.iter().map(|column| numbers(&column.to_array())).collect();
+            text.line(format_args!("      J     {}", columns.join("  ")));
+        }
+        text.line("object nodes pushed: n [m], displacement [mm], force [N]");
+        for (number, node) in object_nodes.iter().enumerate().filter(|(_, node)| node.force != DVec3::ZERO) {
+            let moved = (node.position - node.rest) * 1e3;
+            let [position, moved, force] = [node.position, moved, node.force].map(|v| numbers(&v.to_array()));
+            text.line(format_args!("  {number:<5} {position} {moved} {force}"));
+        }
+        self.body.describe(text);
+        self.lattice.iter().for_each(|error| text.row("lattice", error));
+        if let Some(Interpolated { interpolation, torque, difference, .. }) = &self.interpolated {
+            text.line(format_args!("the dataset, interpolated here ({}):", interpolation.name()));
+            text.row("torque", efforts(torque));
+            text.row("difference", format_args!("{} from what is solved", efforts(difference)));
+        }
+        if let Some(Stored { point, q, status, torque, notices, .. }) = &self.stored {
+            text.line(format_args!("stored at point {point}, q = {}: {status}", numbers(q)));
+            text.row("torque", efforts(torque));
+            info::describe_notices(text, notices);
+        }
     }
-    writeln!(text, "object nodes pushed: n [m], displacement [mm], force [N]")?;
-    for (number, node) in object_nodes.iter().enumerate().filter(|(_, node)| node.force != DVec3::ZERO) {
-        let moved = (node.position - node.rest) * 1e3;
-        let [position, moved, force] = [node.position, moved, node.force].map(|v| numbers(&v.to_array()));
-        writeln!(text, "  {number:<5} {position} {moved} {force}")?;
-    }
-    Ok(())
-}
-
-/// Writes joint efforts, each with its unit.
-fn efforts(values: &[f64], chain: &Chain) -> String {
-    scene::efforts(values, chain.joints.iter().map(|joint| (joint.name.as_str(), joint.kind.unit())))
 }
 
 /// Least weight that is printed: smaller ones would read zero (1).

@@ -1,8 +1,13 @@
 //! `haptize man`: manual pages, one for the program and one for each command.
 
-use super::{Failure, Report, output::Folder};
+use super::{
+    Failure,
+    output::{Folder, Overwritten},
+    report::{self, Describe, Report, Text},
+};
 use crate::dataset::replace_file;
 use clap_mangen::Man;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Where the pages go.
@@ -32,9 +37,23 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         replace_file(file, |out| page.render(out))
             .map_err(|error| format!("cannot write {}: {error}; give another place by -o", file.display()))?;
     }
-    let mut text = format!("{} manual pages in {}\n", files.len(), folder.display());
-    let shown: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    let mut json = serde_json::json!({ "files": shown });
-    earlier.close(&files, &mut text, &mut json)?;
-    Ok(Report { text, json, whole: true })
+    let (shown, folder) = (report::names(&files), folder.display().to_string());
+    Report::new(&Pages { files: shown, folder, overwritten: earlier.close(&files)? })
+}
+
+/// Pages that were written.
+#[derive(Serialize)]
+struct Pages {
+    files: Vec<String>,
+    #[serde(skip)]
+    folder: String,
+    #[serde(flatten)]
+    overwritten: Overwritten,
+}
+
+impl Describe for Pages {
+    fn describe(&self, text: &mut Text) {
+        text.line(format_args!("{} manual pages in {}", self.files.len(), self.folder));
+        self.overwritten.describe(text);
+    }
 }

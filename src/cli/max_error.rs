@@ -1,11 +1,18 @@
 //! `haptize bake --max-error`: a grid chosen for an error, and baked.
 
-use super::{Failure, Report, tell, watch};
+use super::{
+    Failure,
+    baked::Baked,
+    output::Replaced,
+    report::{Describe, Report, Text},
+    tell, watch,
+};
 use crate::{
     scene::Scene,
     sweep::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
 };
-use std::{fmt::Write, path::Path};
+use serde::Serialize;
+use std::path::Path;
 
 /// Configurations at which the error is measured (1): the rms is to decide whether the aim was kept, and single large
 /// errors where the torque has kinks and jumps make it vary by a third with a hundred.
@@ -23,32 +30,47 @@ pub struct AccuracyGoal<'a> {
     pub resume: bool,
 }
 
+/// A dataset whose grid was chosen for an error.
+#[derive(Serialize)]
+struct BakedForError {
+    #[serde(flatten)]
+    baked: Baked,
+    pilot: Pilot,
+    choice: Choice,
+    /// Whether the error that was measured is at most the one that was asked for.
+    kept: bool,
+}
+
+impl Describe for BakedForError {
+    fn describe(&self, text: &mut Text) {
+        self.baked.describe(text);
+        if !self.kept {
+            text.line("  the aim was missed: the dataset is whole, and errs by more; ask for a smaller error");
+        }
+    }
+}
+
 /// Chooses, states and bakes. Nothing is baked where no grid keeps the error; exit code 1 where the error that the bake
 /// measures is larger.
-pub fn run(scene: &Scene, wanted: &AccuracyGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
-    let (pilot, choice, report) = watch::watched(scene, backend, |bake| {
+pub fn run(
+    scene: &Scene,
+    goal: &AccuracyGoal<'_>,
+    backend: BackendChoice,
+    replaced: Option<Replaced>,
+) -> Result<Report, Failure> {
+    let (pilot, choice, sweep) = watch::watched(scene, backend, |bake| {
         tell(format_args!("haptize: pilot: coarse grids against random configurations ..."));
-        let pilot = Pilot::run(scene, wanted.aim, bake.backend, bake.stop)?;
-        let choice = pilot.choose(scene, wanted.points, bake.backend)?;
+        let pilot = Pilot::run(scene, goal.aim, bake.backend, bake.stop)?;
+        let choice = pilot.choose(scene, goal.points, bake.backend)?;
         state(&pilot, &choice);
         let aim = Some(pilot.relative);
         let bake = Bake { scene: &choice.scene, measured: Some(MEASURED), aim, progress: &mut *bake.progress, ..bake };
-        let report = bake.to_file(wanted.output, wanted.resume)?;
-        Ok::<_, PilotError>((pilot, choice, report))
+        let sweep = bake.to_file(goal.output, goal.resume)?;
+        Ok::<_, PilotError>((pilot, choice, sweep))
     })?;
-    watch::warn(&report);
-    let is_kept = report.error.as_ref().is_some_and(|error| error.keeps(pilot.relative));
-    let mut json = serde_json::to_value(&report)?;
-    json["file"] = wanted.output.display().to_string().into();
-    json["pilot"] = serde_json::to_value(&pilot)?;
-    json["choice"] = serde_json::to_value(&choice)?;
-    json["kept"] = is_kept.into();
-    let mut text = String::new();
-    watch::describe(&mut text, wanted.output, &report, Some(pilot.relative))?;
-    if !is_kept {
-        writeln!(text, "  the aim was missed: the dataset is whole, and errs by more; ask for a smaller error")?;
-    }
-    Ok(Report { text, json, whole: is_kept })
+    let kept = sweep.error.as_ref().is_some_and(|error| error.keeps(pilot.relative));
+    let baked = Baked::new(sweep, goal.output, Some(pilot.relative), replaced)?;
+    Report::of(&BakedForError { baked, pilot, choice, kept }, kept)
 }
 
 /// Prints the choice and its predicted cost, before the bake begins.

@@ -1,18 +1,17 @@
 //! `haptize merge`: the shards of a bake put together into its dataset.
 
 use super::{
-    Failure, Report,
+    Failure,
+    baked::Baked,
     bar::Bar,
-    info, interrupt,
+    interrupt,
     output::{self, Content},
+    report::{Describe, Report, Text},
     tell, watch,
 };
-use crate::names::escaped;
 use crate::sweep::{Merge, MergeError, Merged, Progress, Sweep, ranges};
-use std::{
-    fmt::Write,
-    path::{Path, PathBuf},
-};
+use serde::Serialize;
+use std::path::PathBuf;
 
 /// Arguments of `haptize merge`.
 #[derive(clap::Args)]
@@ -48,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     merge.notes.iter().for_each(|note| tell(format_args!("haptize: {note}")));
     let missing = merge.missing();
     if !missing.is_empty() {
-        return Ok(lacking(&merge, &missing));
+        return lacking(&merge, &missing);
     }
     let stop = interrupt::stop_flag();
     let bar = Bar::new("points", "{wide_bar} {pos}/{len} points");
@@ -56,50 +55,49 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let merged = merge.to_file(output, arguments.measure_error, stop, &mut progress);
     bar.finish();
     interrupt::over();
-    let merged = merged?;
-    watch::warn(&merged.report);
-    let mut json = serde_json::to_value(&merged.report)?;
-    json["file"] = output.display().to_string().into();
-    json["shards"] = merged.shards.into();
-    json["missing"] = "".into();
-    let mut text = describe(output, &merged)?;
-    earlier.tell(&mut text, &mut json);
-    let whole = watch::touches(&merged.report, output, arguments.allow_free, &mut json)?;
-    Ok(Report { text, json, whole })
+    let Merged { shards, report } = merged?;
+    let merged = MergedShards { baked: Baked::new(report, output, None, earlier)?, shards, missing: "" };
+    Report::of(&merged, merged.baked.is_whole(arguments.allow_free))
 }
 
-/// Returns the message about missing shards.
-fn lacking(merge: &Merge, missing: &[usize]) -> Report {
-    let (numbers, count) = (ranges(missing), merge.count());
-    let error = MergeError::Missing { missing: numbers.clone(), count };
+/// A dataset put together.
+#[derive(Serialize)]
+struct MergedShards {
+    #[serde(flatten)]
+    baked: Baked,
+    shards: usize,
+    /// Numbers of missing shards: none.
+    missing: &'static str,
+}
+
+impl Describe for MergedShards {
+    fn describe(&self, text: &mut Text) {
+        let Self { baked, shards, .. } = self;
+        text.line(format_args!("{shards} shards put together"));
+        baked.describe(text);
+    }
+}
+
+/// Shards that are missing.
+#[derive(Serialize)]
+struct MissingShards {
+    /// Their numbers, as job schedulers take them.
+    missing: String,
+    shards: usize,
+    error: String,
+}
+
+impl Describe for MissingShards {
+    fn describe(&self, text: &mut Text) {
+        text.line(&self.missing);
+    }
+}
+
+/// Returns the report of missing shards.
+fn lacking(merge: &Merge, missing: &[usize]) -> Result<Report, Failure> {
+    let (missing, shards) = (ranges(missing), merge.count());
+    let error = MergeError::Missing { missing: missing.clone(), count: shards }.to_string();
     tell(format_args!("haptize: {error}"));
-    tell(format_args!("haptize: with Slurm: sbatch --array={numbers} ... --shard auto/{count}"));
-    let json = serde_json::json!({ "missing": numbers, "shards": count, "error": error.to_string() });
-    Report { text: format!("{numbers}\n"), json, whole: false }
-}
-
-/// Describes the dataset `file`, for people.
-fn describe(file: &Path, merged: &Merged) -> Result<String, Failure> {
-    let report = &merged.report;
-    let mut text = String::new();
-    let lost = report.unconverged + report.overflowed;
-    writeln!(
-        text,
-        "{}: {} points of {} shards, {} in contact, {lost} not converged",
-        file.display(),
-        report.points,
-        merged.shards,
-        report.contact_points
-    )?;
-    writeln!(
-        text,
-        "  merged       in {:.2} s, {} on {} ({})",
-        report.seconds,
-        escaped(&report.algorithm),
-        escaped(&report.backend),
-        escaped(&report.adapter)
-    )?;
-    watch::lowered(&mut text, report.lowered)?;
-    info::error(&mut text, report.error.as_ref(), None)?;
-    Ok(text)
+    tell(format_args!("haptize: with Slurm: sbatch --array={missing} ... --shard auto/{shards}"));
+    Report::of(&MissingShards { missing, shards, error }, false)
 }

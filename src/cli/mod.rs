@@ -6,8 +6,9 @@
 //! - `pub fn run(arguments: &Arguments) -> Result<Report, Failure>`: its work.
 //!
 //! and three lines here: `mod name;`, a variant of `Command` and an arm of `Command::run`. A subcommand appears
-//! here only once it works. It never prints its result itself: it returns a `Report`, and `--json` (an option of every
-//! subcommand) decides here which half of it goes to standard output. Notes and progress go to standard error.
+//! here only once it works. It never prints its result itself: it returns a `Report` of one value that is both described
+//! and serialised, and `--json` (an option of every subcommand) decides here which of the two goes to standard output.
+//! Notes and progress go to standard error.
 //!
 //! Exit codes: 0 the work is whole, 1 it failed or is not whole, 2 the command line itself is wrong (given by clap),
 //! 130 a signal ended it.
@@ -23,6 +24,7 @@ macro_rules! adapter_help {
 
 mod accuracy;
 mod bake;
+mod baked;
 mod bar;
 mod completions;
 mod crash;
@@ -50,12 +52,14 @@ mod playback_report;
 mod played;
 mod reach;
 mod refine;
+mod report;
 mod scan;
 mod shard;
 mod shell;
 mod view;
 mod watch;
 
+use self::report::Report;
 use crate::{
     names,
     render::trace::Tick,
@@ -171,16 +175,6 @@ fn command_line() -> clap::Command {
 
 /// Why a subcommand failed: any module's error. Its message names file and line if there is one, and the remedy.
 type Failure = Box<dyn Error + Send + Sync>;
-
-/// The result of a subcommand, for people and for programs.
-struct Report {
-    /// For people: whole lines, the last one ended too.
-    text: String,
-    /// For programs: one object.
-    json: serde_json::Value,
-    /// False where something is missing from the result (unfinished, or not as it should be): exit code 1.
-    whole: bool,
-}
 
 /// Runs what the command line `arguments`, the program's name first, asks for; returns the exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {

@@ -1,8 +1,13 @@
 //! `haptize new`: a commented scene to begin with, one of those that are part of the program.
 
-use super::{Failure, Report, shell};
+use super::{
+    Failure,
+    report::{Describe, Report, Text},
+    shell,
+};
 use crate::dataset::replace_file;
 use clap::ValueEnum;
+use serde::Serialize;
 use std::{
     io::Write as _,
     path::{Path, PathBuf},
@@ -125,9 +130,23 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         replace_file(path, |out| out.write_all(text.as_bytes()))
             .map_err(|error| format!("cannot write {}: {error}; give another place by -o", path.display()))?;
     }
-    let names: Vec<String> = files.iter().map(|(path, _)| path.display().to_string()).collect();
-    let text = format!("wrote {}\nnext: {}\n", names.join(" and "), arguments.from.next(&scene));
-    Ok(Report { text, json: serde_json::json!({ "files": names }), whole: true })
+    let files = files.iter().map(|(path, _)| path.display().to_string()).collect();
+    Report::new(&Written { files, next: arguments.from.next(&scene) })
+}
+
+/// A scene to begin with.
+#[derive(Serialize)]
+struct Written {
+    files: Vec<String>,
+    #[serde(skip)]
+    next: String,
+}
+
+impl Describe for Written {
+    fn describe(&self, text: &mut Text) {
+        text.line(format_args!("wrote {}", self.files.join(" and ")));
+        text.line(format_args!("next: {}", self.next));
+    }
 }
 
 fn taken(path: &Path) -> Failure {

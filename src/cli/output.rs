@@ -1,17 +1,20 @@
 //! The files that a command writes: never over one of its inputs, over what is no regular file, or, without `--force`,
 //! over a file of another program. A file that is replaced is reported.
 
-use super::Failure;
+use super::{
+    Failure,
+    report::{Describe, Text},
+};
 use crate::{
-    dataset::{may_be_dataset, resolved},
+    dataset::{may_be_dataset, replace_file, resolved},
     render::recording::SIGNATURE as SESSION,
     scan::SIGNATURE,
+    scene::Scene,
 };
-use serde_json::{Value, json};
+use serde::Serialize;
 use std::{
-    fmt::Write,
     fs::{self, File},
-    io::{self, Read},
+    io::{self, Read, Write as _},
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
     time::SystemTime,
@@ -82,20 +85,28 @@ fn is_table(start: &[u8]) -> bool {
     columns.filter(|column| column.contains(" [") && column.trim_end().ends_with(']')).count() > 1
 }
 
-/// A file that is going to be replaced, where there is one.
-pub struct Earlier(Option<(u64, SystemTime)>);
+/// A file that is replaced.
+#[derive(Serialize)]
+pub struct Replaced {
+    replaced: Earlier,
+}
 
-impl Earlier {
-    /// Tells what was replaced: its size and its date.
-    pub fn tell(&self, text: &mut String, json: &mut Value) {
-        let Some((bytes, time)) = self.0 else { return };
-        let date = humantime::format_rfc3339_seconds(time).to_string();
-        let _ = writeln!(text, "  replaced     an earlier file of {bytes} bytes from {date}");
-        json["replaced"] = json!({ "bytes": bytes, "date": date });
+#[derive(Serialize)]
+struct Earlier {
+    bytes: u64,
+    /// When it was written, ISO 8601, UTC.
+    date: String,
+}
+
+impl Describe for Replaced {
+    fn describe(&self, text: &mut Text) {
+        let Earlier { bytes, date } = &self.replaced;
+        text.row("replaced", format_args!("an earlier file of {bytes} bytes from {date}"));
     }
 }
 
-/// Checks that a file which holds `content` may be written to `output` by a command that reads `inputs`.
+/// Checks that a file which holds `content` may be written to `output` by a command that reads `inputs`, and
+/// returns the file that is replaced, if there is one.
 ///
 /// # Errors
 /// When `output` is one of the inputs, by whatever name, is there and no regular file, may not be read or written to,
@@ -104,9 +115,9 @@ pub fn check<'a>(
     output: &Path,
     content: Content,
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<Earlier, Failure> {
+) -> Result<Option<Replaced>, Failure> {
     let refused = |why: &str| format!("{}: {why}; nothing is written: name another file", output.display());
-    let Some((file, there)) = replaceable(output)? else { return Ok(Earlier(None)) };
+    let Some((file, there)) = replaceable(output)? else { return Ok(None) };
     if inputs.into_iter().any(|input| is_same(output, input)) {
         return Err(refused("this is also an input, which would be lost").into());
     }
@@ -118,7 +129,9 @@ pub fn check<'a>(
         let what = content.name();
         return Err(refused(&format!("there is a file already that is not {what} (--force replaces it)")).into());
     }
-    Ok(Earlier(Some((there.len(), there.modified().unwrap_or(SystemTime::UNIX_EPOCH)))))
+    let time = there.modified().unwrap_or(SystemTime::UNIX_EPOCH);
+    let date = humantime::format_rfc3339_seconds(time).to_string();
+    Ok(Some(Replaced { replaced: Earlier { bytes: there.len(), date } }))
 }
 
 /// Returns the file that writing to `output` replaces, links followed, if there is one.
@@ -136,6 +149,17 @@ pub fn replaceable(output: &Path) -> Result<Option<(PathBuf, fs::Metadata)>, Fai
         );
     }
     Ok(Some((file, there)))
+}
+
+/// Adds `tables` to the file of `scene`, and returns its name.
+///
+/// # Errors
+/// When the scene would not be valid with them, or cannot be written.
+pub fn append(scene: &Scene, tables: &str) -> Result<String, Failure> {
+    let whole = format!("{}\n\n{tables}", scene.text.trim_end());
+    Scene::parse(&whole, &scene.path)?;
+    replace_file(&scene.path, |file| file.write_all(whole.as_bytes()))?;
+    Ok(scene.path.display().to_string())
 }
 
 /// A folder that a command fills with files whose names it knows.
@@ -181,12 +205,12 @@ impl Folder {
         Ok(())
     }
 
-    /// Removes what an earlier run has left and this one has not `written` again, and reports what was replaced and
+    /// Removes what an earlier run has left and this one has not `written` again, and returns what was replaced and
     /// removed.
     ///
     /// # Errors
     /// When such a file cannot be removed.
-    pub fn close(self, written: &[PathBuf], text: &mut String, json: &mut Value) -> Result<(), Failure> {
+    pub fn close(self, written: &[PathBuf]) -> Result<Overwritten, Failure> {
         let (replaced, stale): (Vec<_>, Vec<_>) = self.earlier.into_iter().partition(|file| written.contains(file));
         for file in &stale {
             fs::remove_file(file).map_err(|error| {
@@ -196,15 +220,26 @@ impl Folder {
         let names = |files: &[PathBuf]| -> Vec<String> {
             files.iter().map(|file| file.strip_prefix(&self.path).unwrap_or(file).display().to_string()).collect()
         };
+        Ok(Overwritten { replaced: names(&replaced), removed: names(&stale) })
+    }
+}
+
+/// Files of an earlier run in a folder, by their names there.
+#[derive(Serialize)]
+pub struct Overwritten {
+    replaced: Vec<String>,
+    removed: Vec<String>,
+}
+
+impl Describe for Overwritten {
+    fn describe(&self, text: &mut Text) {
+        let Self { replaced, removed } = self;
         if !replaced.is_empty() {
-            let _ = writeln!(text, "  replaced     {} files of an earlier run", replaced.len());
+            text.row("replaced", format_args!("{} files of an earlier run", replaced.len()));
         }
-        if !stale.is_empty() {
-            let _ = writeln!(text, "  removed      {}, which an earlier run had left", names(&stale).join(", "));
+        if !removed.is_empty() {
+            text.row("removed", format_args!("{}, which an earlier run had left", removed.join(", ")));
         }
-        json["replaced"] = names(&replaced).into();
-        json["removed"] = names(&stale).into();
-        Ok(())
     }
 }
 

@@ -1,12 +1,14 @@
 //! `haptize paper`: the figures and numbers of the paper, remade with the scenes that are part of the program.
 
 use super::{
-    Failure, Report,
+    Failure,
+    baked::Baked,
     bar::Bar,
     gridize::{self, Source},
     interrupt, motion,
-    output::{self, Folder},
+    output::{self, Folder, Overwritten},
     played,
+    report::{self, Describe, Report, Text},
     scan::{self, Course},
     tell, watch,
 };
@@ -14,9 +16,12 @@ use crate::{
     dataset::{Dataset, replace_file},
     draw::canvas::Canvas,
     gridize::{GridizeOptions, Interpolation},
-    render::{setup::Setup, trace::Trace},
+    render::{
+        setup::Setup,
+        trace::{Summary, Trace},
+    },
     report::{
-        self,
+        self as figures,
         force::{EndForce, force},
         gridized::gridized,
         object,
@@ -29,8 +34,8 @@ use crate::{
     scene::{ScanScene, Scene},
     sweep::BackendChoice,
 };
+use serde::Serialize;
 use std::{
-    fmt::Write as _,
     io::Write as _,
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
@@ -110,7 +115,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = Scene::parse(SPHERE, "datasets/paper.toml")?;
     tell(format_args!("section 4.1: haptizing and pressing the sphere ..."));
     let (dataset, sweep) = watch::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
-    watch::warn(&sweep);
     dataset.save(&folder.join("paper.haptize"))?;
     let (setup, pressed) = felt(&dataset, "press")?;
     let (_, scraped) = felt(&dataset, "scrape")?;
@@ -141,39 +145,54 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     files.extend(figures.sheet("scrape", &press::titled("Scraping over the sphere", &scraped))?);
 
     let comparison = Comparison::new(sphere, scans);
-    let json = serde_json::json!({
-        "comparison": comparison, "bake": sweep, "press": pressed.summary(), "scrape": scraped.summary()
-    });
     let table = folder.join("table.md");
     replace_file(&table, |out| out.write_all(comparison.markdown().as_bytes()))
         .map_err(|error| format!("cannot write {}: {error}", table.display()))?;
     files.push(table);
-    let seconds = started.elapsed().as_secs_f64();
-    let mut report = describe(&comparison, folder, seconds, json, &files)?;
+    let written = report::names(&files);
     let data = FILES.iter().filter(|name| name.ends_with(".csv") || name.ends_with(".haptize"));
     files.extend(data.map(|name| folder.join(name)));
-    earlier.close(&files, &mut report.text, &mut report.json)?;
-    Ok(report)
+    let remade = Remade {
+        comparison,
+        bake: Baked::new(sweep, &folder.join("paper.haptize"), None, None)?,
+        press: pressed.summary(),
+        scrape: scraped.summary(),
+        seconds: started.elapsed().as_secs_f64(),
+        files: written,
+        overwritten: earlier.close(&files)?,
+        folder: folder.display().to_string(),
+    };
+    Report::new(&remade)
 }
 
-fn describe(
-    comparison: &Comparison,
-    folder: &Path,
+/// The paper's figures and numbers, remade.
+#[derive(Serialize)]
+struct Remade {
+    comparison: Comparison,
+    bake: Baked,
+    press: Summary,
+    scrape: Summary,
+    /// Wall time (s).
     seconds: f64,
-    mut json: serde_json::Value,
-    files: &[PathBuf],
-) -> Result<Report, Failure> {
-    json["seconds"] = seconds.into();
-    json["files"] = files.iter().map(|file| file.display().to_string()).collect();
-    let mut text = String::new();
-    let drawn = comparison.figures.iter().filter(|figure| !figure.file.is_empty()).count();
-    writeln!(text, "{drawn} of the paper's {} figures remade in {seconds:.0} s", comparison.figures.len())?;
-    writeln!(text, "{} numbers compared; those that differ:", comparison.rows.len())?;
-    for row in comparison.rows.iter().filter(|row| row.differs()) {
-        writeln!(text, "  {}: {} in the paper, {} here", row.quantity, row.paper, row.ours)?;
+    files: Vec<String>,
+    #[serde(flatten)]
+    overwritten: Overwritten,
+    #[serde(skip)]
+    folder: String,
+}
+
+impl Describe for Remade {
+    fn describe(&self, text: &mut Text) {
+        let Self { comparison: Comparison { figures, rows }, seconds, overwritten, folder, .. } = self;
+        let drawn = figures.iter().filter(|figure| !figure.file.is_empty()).count();
+        text.line(format_args!("{drawn} of the paper's {} figures remade in {seconds:.0} s", figures.len()));
+        text.line(format_args!("{} numbers compared; those that differ:", rows.len()));
+        for row in rows.iter().filter(|row| row.differs()) {
+            text.line(format_args!("  {}: {} in the paper, {} here", row.quantity, row.paper, row.ours));
+        }
+        text.line(format_args!("table, figures and datasets in {folder}; begin with table.md"));
+        overwritten.describe(text);
     }
-    writeln!(text, "table, figures and datasets in {}; begin with table.md", folder.display())?;
-    Ok(Report { text, json, whole: true })
 }
 
 /// Plays the `motion` of the dataset's scene with a simulated hand, as fast as it goes.
@@ -265,11 +284,11 @@ struct Figures<'a> {
 impl Figures<'_> {
     /// Writes a figure of lines and text, as SVG and PNG.
     fn sheet(&self, name: &str, canvas: &Canvas) -> Result<Vec<PathBuf>, Failure> {
-        Ok(report::write_both(self.folder, name, canvas)?.to_vec())
+        Ok(figures::write_both(self.folder, name, canvas)?.to_vec())
     }
 
     /// Writes a figure with pictures in it, as PNG.
     fn picture(&self, name: &str, canvas: &Canvas) -> Result<Vec<PathBuf>, Failure> {
-        Ok(vec![report::write_png(self.folder, name, canvas)?])
+        Ok(vec![figures::write_png(self.folder, name, canvas)?])
     }
 }

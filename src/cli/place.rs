@@ -1,15 +1,18 @@
 //! `haptize place`: the tip of an arm before an object, and a grid and a press there.
 
-use super::{Failure, Report, output};
+use super::{
+    Failure, output,
+    report::{Describe, Report, Text},
+};
 use crate::{
-    dataset::replace_file,
     proxy::Chain,
     scene::Scene,
     sweep::Placing,
     toml_text::{list, number, vector},
 };
 use glam::DVec3;
-use std::{fmt::Write, io::Write as _, path::PathBuf};
+use serde::Serialize;
+use std::path::PathBuf;
 
 /// Arguments of `haptize place`.
 #[derive(clap::Args)]
@@ -49,53 +52,85 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         return Err(format!("{}: the arm has no contact node", arguments.scene.display()).into());
     }
     let placing = Placing::new(&scene, wanted)?;
-    let mut json = serde_json::to_value(&placing)?;
-    let mut text = String::new();
-    let Placing { body: [low, high], link, tip, at, point, normal, q, short, gap, .. } = &placing;
-    let size: Vec<String> = (*high - *low).to_array().map(|side| format!("{:.1}", 1e3 * side)).to_vec();
-    let place = |point: DVec3| vector(point, 4);
-    writeln!(text, "{}: the tip of the arm before the object", arguments.scene.display())?;
-    writeln!(text, "  object       {} mm, from {} to {} m", size.join(" x "), place(*low), place(*high))?;
-    let middle = "with every joint in the middle of its limits";
-    writeln!(text, "  tip          contact node {tip}, of link `{link}`: at {} m {middle}", place(*at))?;
-    writeln!(
-        text,
-        "  pressed      {} m on the surface, which looks along {} there",
-        place(*point),
-        vector(*normal, 3)
-    )?;
-    writeln!(text, "  q            {}", list(q, |x| number(*x, 5)))?;
-    let refusal = if !placing.reaches() {
-        writeln!(text, "  out of reach {:.1} mm: the joints bring the tip no nearer", 1e3 * short.length())?;
-        let moved = place(-*short);
-        let centre = place(placing.centre - *short);
-        Some(format!(
-            "move the object by {moved} m: centre = {centre}; or the arm by the opposite; or widen its limits"
-        ))
-    } else if !placing.is_clear() {
-        writeln!(text, "  in the way   the arm is {:.1} mm inside the object elsewhere", -1e3 * gap)?;
-        Some("choose a point from which the rest of the arm keeps away (--at), or move the object".to_owned())
-    } else {
-        writeln!(text, "  clear        the whole arm is {:.1} mm or more from the object", 1e3 * gap)?;
-        None
+    let refusal = refusal(&placing);
+    let tables = if refusal.is_some() { None } else { Some(tables(&placing, &scene)?) };
+    let written = tables.as_deref().filter(|_| arguments.write).map(|tables| output::append(&scene, tables));
+    let placed = Placed {
+        placing,
+        refusal,
+        tables,
+        written: written.transpose()?,
+        scene: arguments.scene.display().to_string(),
     };
-    if let Some(refusal) = &refusal {
-        writeln!(text, "\n{refusal}")?;
-        json["refusal"] = refusal.as_str().into();
-    } else {
-        let mut tables = String::new();
-        placing.press.write_grid(&mut tables, &scene.proxy.joints)?;
-        tables.push('\n');
-        placing.press.write_motion(&mut tables)?;
-        write!(text, "\n{tables}")?;
-        json["tables"] = tables.as_str().into();
-        if arguments.write {
-            let whole = format!("{}\n\n{tables}", scene.text.trim_end());
-            Scene::parse(&whole, &arguments.scene)?;
-            replace_file(&arguments.scene, |file| file.write_all(whole.as_bytes()))?;
-            writeln!(text, "  added to     {}", arguments.scene.display())?;
-            json["written"] = arguments.scene.display().to_string().into();
-        }
+    Report::of(&placed, placed.refusal.is_none())
+}
+
+/// Where the tip of an arm stands before an object.
+#[derive(Serialize)]
+struct Placed {
+    #[serde(flatten)]
+    placing: Placing,
+    /// Why it gets nowhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refusal: Option<String>,
+    /// Grid and motion, as a scene has them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tables: Option<String>,
+    /// The scene to which they were added.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    written: Option<String>,
+    #[serde(skip)]
+    scene: String,
+}
+
+/// Returns what to do where the tip does not reach the point, or another part of the arm is in the way.
+fn refusal(placing: &Placing) -> Option<String> {
+    if !placing.reaches() {
+        let [moved, centre] = [-placing.short, placing.centre - placing.short].map(|place| vector(place, 4));
+        return Some(format!(
+            "move the object by {moved} m: centre = {centre}; or the arm by the opposite; or widen its limits"
+        ));
     }
-    Ok(Report { text, json, whole: refusal.is_none() })
+    let in_the_way = "choose a point from which the rest of the arm keeps away (--at), or move the object";
+    (!placing.is_clear()).then(|| in_the_way.to_owned())
+}
+
+/// Returns the tables of grid and press.
+fn tables(placing: &Placing, scene: &Scene) -> Result<String, Failure> {
+    let mut tables = String::new();
+    placing.press.write_grid(&mut tables, &scene.proxy.joints)?;
+    tables.push('\n');
+    placing.press.write_motion(&mut tables)?;
+    Ok(tables)
+}
+
+impl Describe for Placed {
+    fn describe(&self, text: &mut Text) {
+        let Self { placing, refusal, tables, written, scene } = self;
+        let Placing { body: [low, high], link, tip, at, point, normal, q, short, gap, .. } = placing;
+        let size: Vec<String> = (*high - *low).to_array().map(|side| format!("{:.1}", 1e3 * side)).to_vec();
+        let [low, high, at, point] = [low, high, at, point].map(|place| vector(*place, 4));
+        text.line(format_args!("{scene}: the tip of the arm before the object"));
+        text.row("object", format_args!("{} mm, from {low} to {high} m", size.join(" x ")));
+        let middle = "with every joint in the middle of its limits";
+        text.row("tip", format_args!("contact node {tip}, of link `{link}`: at {at} m {middle}"));
+        let normal = vector(*normal, 3);
+        text.row("pressed", format_args!("{point} m on the surface, which looks along {normal} there"));
+        text.row("q", list(q, |x| number(*x, 5)));
+        let gap = 1e3 * gap;
+        match () {
+            () if !placing.reaches() => {
+                let short = 1e3 * short.length();
+                text.row("out of reach", format_args!("{short:.1} mm: the joints bring the tip no nearer"));
+            }
+            () if !placing.is_clear() => {
+                text.row("in the way", format_args!("the arm is {:.1} mm inside the object elsewhere", -gap));
+            }
+            () => text.row("clear", format_args!("the whole arm is {gap:.1} mm or more from the object")),
+        }
+        for found in refusal.iter().chain(tables) {
+            text.line(format_args!("\n{}", found.trim_end()));
+        }
+        written.iter().for_each(|scene| text.row("added to", scene));
+    }
 }

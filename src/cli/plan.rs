@@ -1,14 +1,16 @@
 //! `haptize plan`: what each shard of a bake is going to take, and lines that start them all.
 
-use super::{Failure, Report, interrupt, shell, watch};
+use super::{
+    Failure, interrupt,
+    report::{Describe, Report, Text},
+    shell, watch,
+};
 use crate::{
     scene::Scene,
     sweep::{BackendChoice, Forecast, Plan},
 };
-use std::{
-    fmt::{self, Write},
-    path::PathBuf,
-};
+use serde::Serialize;
+use std::path::PathBuf;
 
 /// Arguments of `haptize plan`.
 #[derive(clap::Args)]
@@ -44,17 +46,24 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     interrupt::over();
     let plan = plan?;
     let cores = arguments.cores.map_or(plan.threads, |cores| cores as usize);
-    let lines = Lines::new(arguments, &plan, cores);
-    let mut json = serde_json::to_value(&plan)?;
-    json["seconds"] = plan.seconds().into();
-    json["lines"] = serde_json::to_value(&lines)?;
-    let mut text = String::new();
-    describe(&mut text, &plan, arguments, &lines)?;
-    Ok(Report { text, json, whole: true })
+    let (lines, seconds) = (Lines::new(arguments, &plan, cores), plan.seconds());
+    Report::new(&Planned { scene: arguments.scene.display().to_string(), plan, seconds, lines })
+}
+
+/// What the shards of a bake take, and how they are started.
+#[derive(Serialize)]
+struct Planned {
+    #[serde(flatten)]
+    plan: Plan,
+    /// Time of all shards, one after the other (s).
+    seconds: Option<f64>,
+    lines: Lines,
+    #[serde(skip)]
+    scene: String,
 }
 
 /// Lines that start all shards and the merge.
-#[derive(serde::Serialize)]
+#[derive(Serialize)]
 struct Lines {
     slurm: Vec<String>,
     parallel: Vec<String>,
@@ -105,39 +114,39 @@ impl Lines {
     }
 }
 
-fn describe(text: &mut String, plan: &Plan, arguments: &Arguments, lines: &Lines) -> fmt::Result {
-    let (count, points) = (plan.shards.len(), plan.points);
-    let skipped = points - plan.solved;
-    writeln!(text, "{}: {points} points in {count} shards, {skipped} of them proven free", arguments.scene.display())?;
-    let Forecast { contact_fraction, sampled, .. } = plan.forecast;
-    writeln!(text, "  contact      {:.0} % of {sampled} sampled points", 100.0 * contact_fraction)?;
-    match (plan.seconds(), plan.longest()) {
-        (Some(all), Some(longest)) => writeln!(
-            text,
-            "  time         {} for all on {} threads such as here, {} for the longest shard, {} of it to set up; \
-             lower equilibria and the error come on top, in the merge",
-            watch::duration(all),
-            plan.threads,
-            watch::duration(longest),
-            watch::duration(plan.setup)
-        )?,
-        _ => writeln!(text, "  time         not predicted for a GPU; {} to set up each", watch::duration(plan.setup))?,
+impl Describe for Planned {
+    fn describe(&self, text: &mut Text) {
+        let Self { scene, plan, seconds, lines } = self;
+        let (count, points, setup) = (plan.shards.len(), plan.points, watch::duration(plan.setup));
+        let skipped = points - plan.solved;
+        text.line(format_args!("{scene}: {points} points in {count} shards, {skipped} of them proven free"));
+        let Forecast { contact_fraction, sampled, .. } = plan.forecast;
+        text.row("contact", format_args!("{:.0} % of {sampled} sampled points", 100.0 * contact_fraction));
+        match (seconds, plan.longest()) {
+            (Some(all), Some(longest)) => text.row(
+                "time",
+                format_args!(
+                    "{} for all on {} threads such as here, {} for the longest shard, {setup} of it to set up; lower \
+                     equilibria and the error come on top, in the merge",
+                    watch::duration(*all),
+                    plan.threads,
+                    watch::duration(longest)
+                ),
+            ),
+            _ => text.row("time", format_args!("not predicted for a GPU; {setup} to set up each")),
+        }
+        let solved = || plan.shards.iter().map(|shard| shard.solved);
+        let (least, most) = (solved().min().unwrap_or(0), solved().max().unwrap_or(0));
+        text.row("balance", format_args!("{least} to {most} points to be solved in a shard"));
+        let shard = plan.shards.iter().map(|shard| shard.bytes).max().unwrap_or(0);
+        let [shard, dataset, memory] = [shard, plan.dataset, plan.memory].map(watch::megabytes);
+        text.row("disk", format_args!("{shard} a shard, {dataset} the dataset, twice that for a moment in the merge"));
+        text.row("memory", format_args!("{memory} a process"));
+        for (name, lines) in
+            [("Slurm", &lines.slurm), ("GNU parallel", &lines.parallel), ("HyperQueue", &lines.hyperqueue)]
+        {
+            text.line(format_args!("\n{name}:"));
+            lines.iter().for_each(|line| text.line(format_args!("  {line}")));
+        }
     }
-    let solved = || plan.shards.iter().map(|shard| shard.solved);
-    let (least, most) = (solved().min().unwrap_or(0), solved().max().unwrap_or(0));
-    writeln!(text, "  balance      {least} to {most} points to be solved in a shard")?;
-    let bytes = plan.shards.iter().map(|shard| shard.bytes).max().unwrap_or(0);
-    writeln!(
-        text,
-        "  disk         {} a shard, {} the dataset, twice that for a moment in the merge",
-        watch::megabytes(bytes),
-        watch::megabytes(plan.dataset)
-    )?;
-    writeln!(text, "  memory       {} a process", watch::megabytes(plan.memory))?;
-    for (name, lines) in [("Slurm", &lines.slurm), ("GNU parallel", &lines.parallel), ("HyperQueue", &lines.hyperqueue)]
-    {
-        writeln!(text, "\n{name}:")?;
-        lines.iter().try_for_each(|line| writeln!(text, "  {line}"))?;
-    }
-    Ok(())
 }

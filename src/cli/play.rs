@@ -2,33 +2,36 @@
 //! traces and figures of it.
 
 use super::{
-    Failure, Report, interrupt,
+    Failure, interrupt,
     keyboard::Keyboard,
     motion,
-    output::{self, Content, Earlier, Folder},
+    output::{self, Content, Folder, Overwritten, Replaced},
     playback_report::{Beside, PlaybackReport},
-    played::{FILES, Played, SNAPSHOTS, describe, describe_timing, play, play_timed, traced, unwritten, write},
+    played::{FILES, Played, SNAPSHOTS, describe_session, play, play_timed, traced, unwritten, write},
+    report::{self, Describe, Report, Text},
     tell,
     watch::warn_of_free_space,
 };
 use crate::{
-    dataset::{Dataset, replace_file},
+    dataset::{Dataset, JointLabel, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     render::{
         live::LiveScene,
         mcap,
+        passivity::Bound,
         realtime::Options,
         recording::Recording,
         setup::{Setup, border_stiffness, labels},
-        trace::{Summary, Tick},
+        timing::Timing,
+        trace::{Summary, Tick, Trace},
     },
-    report,
+    report::FIGURES,
     scene::Scene,
+    sweep::Clearance,
 };
-use serde_json::{Value, json};
+use serde::Serialize;
 use std::{
     collections::BTreeMap,
-    fmt::{self, Write},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -92,7 +95,7 @@ const LONGEST: f64 = 3600.0;
 /// Plays the dataset or the scene.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
-    let Outputs { filled, recorded } = Outputs::check(arguments, &folder)?;
+    let Outputs { filled, replaced } = Outputs::check(arguments, &folder)?;
     let live = live(&arguments.dataset)?;
     let dataset = Arc::new(match &live {
         Some(scene) => scene.dataset(),
@@ -137,106 +140,127 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let drawn = felt.draw(&folder, &played.trace)?;
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
-    let outcome = Outcome::of(&played, told.is_some());
-    let mut json = outcome.json(arguments, &setup)?;
-    json["clearance"] = serde_json::to_value(clearance)?;
-    felt.tell(&mut json);
-    json["files"] = files.iter().map(|file| Value::from(file.display().to_string())).collect();
-    let mut text = told.unwrap_or_default();
-    outcome.describe(&mut text, arguments, &setup, &dataset, &felt)?;
-    if let Some(file) = &arguments.record {
-        writeln!(text, "recorded in {}", file.display())?;
-    }
-    if let Some(recorded) = recorded {
-        recorded.tell(&mut text, &mut json["recording"]);
-    }
-    writeln!(text, "traces and figures in {}", folder.display())?;
-    filled.close(&files, &mut text, &mut json)?;
-    Ok(Report { text, json, whole: outcome.is_whole() })
+    let trace = &played.trace;
+    let tally = tally(trace);
+    let summary = trace.summary();
+    let fault = trace.ticks.iter().find_map(|tick| Some(Fault { time: tick.time, reason: tick.fault?.to_string() }));
+    let is_whole = fault.is_none() && tally.stopped.is_none();
+    let session = PlayedSession {
+        border: (summary.held > 0).then(|| border_stiffness(&setup.scene.haptics, &dataset.grid).to_string()),
+        summary,
+        notes: setup.exceeded.iter().map(ToString::to_string).collect(),
+        bounds: setup.bounds,
+        fault,
+        replayed: told.is_some(),
+        device: arguments.device.as_ref().map(|device| Driven { name: device.to_string(), tally }),
+        clearance,
+        felt,
+        recording: arguments.record.as_ref().map(|file| Record { file: file.display().to_string(), replaced }),
+        overwritten: filled.close(&files)?,
+        files: report::names(&files),
+        told,
+        joints: trace.joints.clone(),
+        timing: played.timing,
+        folder: folder.display().to_string(),
+    };
+    Report::of(&session, is_whole)
 }
 
-/// Sums up what became of a session.
-struct Outcome<'a> {
-    played: &'a Played,
+/// A session that was played.
+#[derive(Serialize)]
+struct PlayedSession {
+    #[serde(flatten)]
     summary: Summary,
-    tally: Tally,
-    /// When the torque went to zero, and why.
-    fault: Option<(f64, String)>,
+    /// Passivity bounds that are exceeded, in words.
+    notes: Vec<String>,
+    bounds: Vec<Bound>,
+    timing: Option<Timing>,
+    fault: Option<Fault>,
     /// Whether a recording was replayed.
-    is_replay: bool,
+    replayed: bool,
+    device: Option<Driven>,
+    /// How near arm and object come where nothing touches.
+    clearance: Option<Clearance>,
+    #[serde(flatten)]
+    felt: PlaybackReport,
+    files: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    recording: Option<Record>,
+    #[serde(flatten)]
+    overwritten: Overwritten,
+    /// What the replay has shown.
+    #[serde(skip)]
+    told: Option<String>,
+    #[serde(skip)]
+    joints: Vec<JointLabel>,
+    /// Stiffness with which the border of the range holds the device, where it does.
+    #[serde(skip)]
+    border: Option<String>,
+    /// Where traces and figures are.
+    #[serde(skip)]
+    folder: String,
 }
 
-impl<'a> Outcome<'a> {
-    fn of(played: &'a Played, is_replay: bool) -> Self {
-        let mut tally = Tally::default();
-        played.trace.ticks.iter().for_each(|tick| tally.add(tick.applied.clamps, tick.applied.halt));
-        let fault = played.trace.ticks.iter().find_map(|tick| Some((tick.time, tick.fault?.to_string())));
-        Self { played, summary: played.trace.summary(), tally, fault, is_replay }
-    }
+/// When the torque went to zero (s), and why.
+#[derive(Serialize)]
+struct Fault {
+    time: f64,
+    reason: String,
+}
 
-    /// Whether it went as it should to the end.
-    fn is_whole(&self) -> bool {
-        self.fault.is_none() && self.tally.stopped.is_none()
-    }
+/// A real device, and how often it was clamped and stopped.
+#[derive(Serialize)]
+struct Driven {
+    name: String,
+    tally: Tally,
+}
 
-    fn json(&self, arguments: &Arguments, setup: &Setup) -> Result<Value, Failure> {
-        let Self { played, summary, tally, fault, is_replay } = self;
-        let mut json = serde_json::to_value(summary)?;
-        json["notes"] = setup.exceeded.iter().map(ToString::to_string).collect();
-        json["bounds"] = serde_json::to_value(&setup.bounds)?;
-        json["timing"] = serde_json::to_value(&played.timing)?;
-        json["fault"] = fault.as_ref().map(|(time, reason)| json!({ "time": time, "reason": reason })).into();
-        json["replayed"] = (*is_replay).into();
-        json["device"] = device_json(arguments, tally)?;
-        Ok(json)
-    }
+/// The record of a session.
+#[derive(Serialize)]
+struct Record {
+    file: String,
+    #[serde(flatten)]
+    replaced: Option<Replaced>,
+}
 
-    fn describe(
-        &self,
-        text: &mut String,
-        arguments: &Arguments,
-        setup: &Setup,
-        dataset: &Dataset,
-        felt: &PlaybackReport,
-    ) -> Result<(), Failure> {
-        let Self { played, summary, tally, fault, .. } = self;
-        describe(text, summary, &played.trace.joints)?;
-        if summary.held > 0 {
-            let stiffness = border_stiffness(&setup.scene.haptics, &dataset.grid);
-            writeln!(text, "  border       holds the device with the coupling's stiffness Kvc: {stiffness}")?;
+impl Describe for PlayedSession {
+    fn describe(&self, text: &mut Text) {
+        self.told.iter().for_each(|line| text.line(line));
+        describe_session(text, "", &self.summary, &self.joints);
+        if let Some(stiffness) = &self.border {
+            text.row("border", format_args!("holds the device with the coupling's stiffness Kvc: {stiffness}"));
         }
-        felt.describe(text)?;
-        if let Some((time, reason)) = fault {
-            writeln!(text, "  fault        at {time:.4} s the torque went to zero: {reason}; play again to clear it")?;
+        self.felt.describe(text);
+        if let Some(Fault { time, reason }) = &self.fault {
+            let remedy = "play again to clear it";
+            text.row("fault", format_args!("at {time:.4} s the torque went to zero: {reason}; {remedy}"));
         }
-        if arguments.device.is_some() {
-            describe_tally(text, tally)?;
+        if let Some(Driven { tally, .. }) = &self.device {
+            for (clamp, ticks) in &tally.clamped {
+                text.row("device", format_args!("torque clamped by {clamp} for {ticks} ticks"));
+            }
+            for (reason, ticks) in &tally.halted {
+                text.row("device", format_args!("without torque for {ticks} ticks: {reason}"));
+            }
+            if let Some(reason) = &tally.stopped {
+                text.row("device", format_args!("stopped for good: {reason}; play again to open it anew"));
+            }
         }
-        if let Some(timing) = &played.timing {
-            describe_timing(text, timing)?;
+        self.timing.describe(text);
+        if let Some(Record { file, replaced }) = &self.recording {
+            text.row("recorded in", file);
+            replaced.describe(text);
         }
-        Ok(())
+        text.row("written to", &self.folder);
+        self.overwritten.describe(text);
     }
 }
 
-/// Returns the device that `arguments` named and how often it was clamped and stopped; null if none was named.
-fn device_json(arguments: &Arguments, tally: &Tally) -> Result<Value, Failure> {
-    let Some(address) = &arguments.device else { return Ok(Value::Null) };
-    Ok(json!({ "name": address.to_string(), "tally": serde_json::to_value(tally)? }))
-}
-
-/// Clamps and stops of a device, for people.
-fn describe_tally(text: &mut String, tally: &Tally) -> fmt::Result {
-    for (clamp, ticks) in &tally.clamped {
-        writeln!(text, "  device       torque clamped by {clamp} for {ticks} ticks")?;
-    }
-    for (reason, ticks) in &tally.halted {
-        writeln!(text, "  device       without torque for {ticks} ticks: {reason}")?;
-    }
-    if let Some(reason) = &tally.stopped {
-        writeln!(text, "  device       stopped for good: {reason}; play again to open it anew")?;
-    }
-    Ok(())
+/// Returns how often torque was clamped and missing in the session of `trace`.
+fn tally(trace: &Trace) -> Tally {
+    let mut tally = Tally::default();
+    trace.ticks.iter().for_each(|tick| tally.add(tick.applied.clamps, tick.applied.halt));
+    tally
 }
 
 /// The session that `arguments` ask for, which hands over its ticks.
@@ -318,7 +342,7 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Stri
             format!("{}: the session differs from tick {tick}, at {time:.4} s, on: {why}", file.display()).into()
         );
     }
-    let told = format!("{} ticks replayed, torque and proxy equal to the last bit\n", recording.ticks());
+    let told = format!("{} ticks replayed, torque and proxy equal to the last bit", recording.ticks());
     Ok((Played { trace: trace.into(), timing: None }, told))
 }
 
@@ -344,9 +368,7 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
             ("dataset".to_owned(), arguments.dataset.display().to_string()),
         ]);
         facts.extend(arguments.device.as_ref().map(|device| ("device".to_owned(), device.to_string())));
-        let mut tally = Tally::default();
-        played.trace.ticks.iter().for_each(|tick| tally.add(tick.applied.clamps, tick.applied.halt));
-        facts.insert("tally".into(), serde_json::to_string(&tally)?);
+        facts.insert("tally".into(), serde_json::to_string(&tally(&played.trace))?);
         replace_file(file, |out| mcap::write(&played.trace, facts, out)).map_err(|error| unwritten(file, error))?;
         return Ok(());
     }
@@ -363,7 +385,7 @@ fn live(path: &Path) -> Result<Option<Arc<LiveScene>>, Failure> {
 /// Returns which of the files that a session writes are there already.
 struct Outputs {
     filled: Folder,
-    recorded: Option<Earlier>,
+    replaced: Option<Replaced>,
 }
 
 impl Outputs {
@@ -371,9 +393,10 @@ impl Outputs {
     fn check(arguments: &Arguments, folder: &Path) -> Result<Self, Failure> {
         let read = [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay);
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).chain([Path::new(&arguments.motion)]).collect();
-        let filled = Folder::check(folder, FILES.into_iter().chain(report::FIGURES), inputs.clone())?;
-        let recorded = arguments.record.as_ref().map(|file| output::check(file, Content::Log, inputs)).transpose()?;
+        let filled = Folder::check(folder, FILES.into_iter().chain(FIGURES), inputs.clone())?;
+        let record = arguments.record.as_ref().map(|file| output::check(file, Content::Log, inputs));
+        let replaced = record.transpose()?.flatten();
         arguments.record.iter().try_for_each(|file| filled.keep_apart(file))?;
-        Ok(Self { filled, recorded })
+        Ok(Self { filled, replaced })
     }
 }

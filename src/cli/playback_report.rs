@@ -1,30 +1,44 @@
 //! The report of `haptize play` beside its traces: the force at the end of the proxy, of one dataset or of two
 //! felt by the same motion, where the torque came from, and what the dataset does not hold.
 
-use super::{Failure, played};
+use super::{
+    Failure,
+    info::describe_absent,
+    played,
+    report::{Describe, Text},
+};
 use crate::{
     dataset::{Dataset, Provenance},
     device::{Motion, SimulatedHand},
     render::{setup::Setup, trace::Trace},
     report::{
-        self,
+        self as figures,
         force::{EndForce, SteadyForce, force},
     },
 };
-use serde_json::{Value, json};
-use std::{
-    fmt::{self, Write},
-    path::{Path, PathBuf},
-};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
 
 /// Variation of a force below which it is reported as steady (1).
 const STEADY: f64 = 0.25;
 
 /// The result of a playback.
+#[derive(Serialize)]
 pub struct PlaybackReport {
-    provenance: Provenance,
+    held_force: Vec<HeldForce>,
+    /// Columns that the dataset does not hold.
     absent: Vec<&'static str>,
+    #[serde(skip)]
+    provenance: Provenance,
+    #[serde(skip)]
     forces: Vec<EndForce>,
+}
+
+/// The steady force of a dataset, if there is one.
+#[derive(Serialize)]
+struct HeldForce {
+    dataset: String,
+    held: Option<SteadyForce>,
 }
 
 /// Another dataset that is felt by the same motion.
@@ -56,47 +70,48 @@ impl<'path> Beside<'path> {
 impl PlaybackReport {
     /// Returns the result of playing the dataset at `path`, recorded in `trace`.
     pub fn new(path: &Path, dataset: &Dataset, setup: &Setup, trace: &Trace) -> Self {
-        Self {
-            provenance: dataset.provenance.clone(),
-            absent: dataset.absent(),
-            forces: EndForce::new(&name(path, dataset), &setup.chain, trace).into_iter().collect(),
-        }
+        let (provenance, absent) = (dataset.provenance.clone(), dataset.absent());
+        let mut report = Self { held_force: Vec::new(), absent, provenance, forces: Vec::new() };
+        report.add(EndForce::new(&name(path, dataset), &setup.chain, trace));
+        report
     }
 
     /// Has `other` felt by the same motion.
     pub fn beside(&mut self, mut other: Beside<'_>, seconds: f64) -> Result<(), Failure> {
         let played = played::play(&other.setup, &other.dataset, &mut other.hand, seconds, &mut |_| ())?;
-        self.forces.extend(EndForce::new(&name(other.path, &other.dataset), &other.setup.chain, &played.trace));
+        self.add(EndForce::new(&name(other.path, &other.dataset), &other.setup.chain, &played.trace));
         Ok(())
+    }
+
+    fn add(&mut self, force: Option<EndForce>) {
+        let held = force.iter().map(|force| HeldForce { dataset: force.name.clone(), held: force.held() });
+        self.held_force.extend(held);
+        self.forces.extend(force);
     }
 
     /// Draws the forces of all datasets in one figure, and returns its files.
     pub fn draw(&self, folder: &Path, trace: &Trace) -> Result<[PathBuf; 2], Failure> {
-        Ok(report::write_both(folder, "force", &force(&self.forces, trace))?)
+        Ok(figures::write_both(folder, "force", &force(&self.forces, trace))?)
     }
+}
 
-    /// For programs.
-    pub fn tell(&self, json: &mut Value) {
-        json["held_force"] =
-            self.forces.iter().map(|felt| json!({ "dataset": felt.name, "held": felt.held() })).collect();
-        json["absent"] = self.absent.clone().into();
-    }
-
-    /// For people.
-    pub fn describe(&self, text: &mut String) -> fmt::Result {
-        for felt in &self.forces {
-            if let Some(SteadyForce { axis, mean, variation }) = felt.held().filter(|held| held.variation < STEADY) {
-                let (percent, name) = (100.0 * variation, &felt.name);
-                write!(text, "  held force   {mean:.3} N along {axis} on {name}, ")?;
-                writeln!(text, "constant to {percent:.1} % over the middle half of the contact")?;
+impl Describe for PlaybackReport {
+    fn describe(&self, text: &mut Text) {
+        for HeldForce { dataset, held } in &self.held_force {
+            if let Some(SteadyForce { axis, mean, variation }) = held.filter(|held| held.variation < STEADY) {
+                let percent = 100.0 * variation;
+                text.row(
+                    "held force",
+                    format_args!(
+                        "{mean:.3} N along {axis} on {dataset}, constant to {percent:.1} % over the middle half of the \
+                         contact"
+                    ),
+                );
             }
         }
         let Provenance { algorithm, backend, adapter, .. } = &self.provenance;
-        writeln!(text, "  torque from  {algorithm} on {backend} ({adapter})")?;
-        if !self.absent.is_empty() {
-            writeln!(text, "  not there    {}", self.absent.join(", "))?;
-        }
-        Ok(())
+        text.row("torque from", format_args!("{algorithm} on {backend} ({adapter})"));
+        describe_absent(text, &self.absent);
     }
 }
 

@@ -1,6 +1,10 @@
 //! A session that was played: its files, and what there is to say about it.
 
-use super::{Failure, interrupt, tell, telling_faults};
+use super::{
+    Failure, interrupt,
+    report::{Describe, Text},
+    tell, telling_faults,
+};
 use crate::{
     dataset::{Dataset, JointLabel, Replacement, discard_unfinished, replace_file},
     device::Device,
@@ -17,7 +21,7 @@ use crate::{
     scene::effort_norms,
 };
 use std::{
-    fmt::{self, Write},
+    fmt,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -130,29 +134,29 @@ fn exchanged(joules: f64) -> String {
     format!("{verb} {:.2} mJ", 1e3 * joules.abs())
 }
 
-/// Describes what was felt along `joints`, for people.
-pub fn describe(text: &mut String, s: &Summary, joints: &[JointLabel]) -> fmt::Result {
+/// Describes what was felt along `joints`, below a first line that begins with `head`.
+pub fn describe_session(text: &mut Text, head: &str, s: &Summary, joints: &[JointLabel]) {
     let sizes = |torque: f64, force: f64| effort_norms([torque, force], joints.iter().map(|joint| joint.unit.as_str()));
-    writeln!(text, "{:.2} s, {} ticks, {:.0} % in contact", s.seconds, s.ticks, 100.0 * s.contact_share)?;
-    write!(text, "  contact      at most {}", sizes(s.max_contact_torque, s.max_contact_force))?;
+    let contact = 100.0 * s.contact_share;
+    text.line(format_args!("{head}{:.2} s, {} ticks, {contact:.0} % in contact", s.seconds, s.ticks));
     // What was measured, and a store, do not say how many nodes of the object are in contact.
-    match s.max_contact_nodes {
-        0 => writeln!(text)?,
-        nodes => writeln!(text, ", {nodes} object nodes")?,
-    }
-    writeln!(
-        text,
-        "  steepest     {} in a millisecond on the proxy, {} on the device",
-        sizes(s.max_contact_torque_step, s.max_contact_force_step),
-        sizes(s.max_device_torque_step, s.max_device_force_step)
-    )?;
-    writeln!(
-        text,
-        "  energy       time step and interpolation {}, sample-and-hold {}; the balance closes to {:.0e} (relative)",
-        exchanged(s.leak),
-        exchanged(s.hold_gain),
-        s.max_relative_account_residual
-    )?;
+    let nodes = match s.max_contact_nodes {
+        0 => String::new(),
+        nodes => format!(", {nodes} object nodes"),
+    };
+    text.row("contact", format_args!("at most {}{nodes}", sizes(s.max_contact_torque, s.max_contact_force)));
+    let proxy = sizes(s.max_contact_torque_step, s.max_contact_force_step);
+    let device = sizes(s.max_device_torque_step, s.max_device_force_step);
+    text.row("steepest", format_args!("{proxy} in a millisecond on the proxy, {device} on the device"));
+    text.row(
+        "energy",
+        format_args!(
+            "time step and interpolation {}, sample-and-hold {}; the balance closes to {:.0e} (relative)",
+            exchanged(s.leak),
+            exchanged(s.hold_gain),
+            s.max_relative_account_residual
+        ),
+    );
     for (count, what) in [
         (s.outside, "in free space outside the haptized range"),
         (s.held, "held at the border of the haptized range: for more room, bake a wider grid"),
@@ -162,46 +166,43 @@ pub fn describe(text: &mut String, s: &Summary, joints: &[JointLabel]) -> fmt::R
         (s.faults, "without torque, after a fault"),
     ] {
         if count > 0 {
-            writeln!(text, "  note         {count} ticks {what}")?;
+            text.row("note", format_args!("{count} ticks {what}"));
         }
     }
-    Ok(())
 }
 
-/// Describes how punctual it was, for people.
-pub fn describe_timing(text: &mut String, timing: &Timing) -> fmt::Result {
-    let mut line = |what: &str, p: Percentiles| {
-        let Percentiles { p50, p99, p999, p9999, max, .. } = p;
-        writeln!(
-            text,
-            "  {what:<12} median {p50:.1} us, 99 % {p99:.1}, 99.9 % {p999:.1}, 99.99 % {p9999:.1}, most {max:.1}"
-        )
-    };
-    line("period", timing.interval)?;
-    line("lateness", timing.lateness)?;
-    line("tick", timing.tick_cost)?;
-    line("frame", timing.frame_cost)?;
-    let Timing { missed_deadlines, missed_frames, unrecorded, late, .. } = timing;
-    writeln!(
-        text,
-        "  missed       {missed_deadlines} deadlines (ticks left out because an earlier one ran late), \
-         {missed_frames} frames, {unrecorded} records"
-    )?;
-    if *late == 0 {
-        return Ok(());
+impl Describe for Timing {
+    fn describe(&self, text: &mut Text) {
+        let Self { interval, lateness, tick_cost, frame_cost, .. } = self;
+        for (what, p) in [("period", interval), ("lateness", lateness), ("tick", tick_cost), ("frame", frame_cost)] {
+            let Percentiles { p50, p99, p999, p9999, max, .. } = p;
+            text.row(
+                what,
+                format_args!("median {p50:.1} us, 99 % {p99:.1}, 99.9 % {p999:.1}, 99.99 % {p9999:.1}, most {max:.1}"),
+            );
+        }
+        let Self { missed_deadlines, missed_frames, unrecorded, late, refused, stolen, .. } = self;
+        text.row(
+            "missed",
+            format_args!(
+                "{missed_deadlines} deadlines (ticks left out because an earlier one ran late), {missed_frames} \
+                 frames, {unrecorded} records"
+            ),
+        );
+        if *late == 0 {
+            return;
+        }
+        // Who has the priority already is not told to give it.
+        let remedy = if refused.is_empty() {
+            "give the loop an idle core"
+        } else {
+            "give the loop real-time priority (haptize doctor) or an idle core"
+        };
+        let stolen = stolen.filter(|seconds| *seconds > 0.0).map_or(String::new(), |seconds| {
+            format!(
+                "; the hypervisor took {seconds:.2} s from this virtual machine meanwhile: give it processors of its own"
+            )
+        });
+        text.row("late", format_args!("{late} ticks by more than half a period: {remedy}{stolen}"));
     }
-    // Who has the priority already is not told to give it.
-    let remedy = if timing.refused.is_empty() {
-        "give the loop an idle core"
-    } else {
-        "give the loop real-time priority (haptize doctor) or an idle core"
-    };
-    write!(text, "  late         {late} ticks by more than half a period: {remedy}")?;
-    if let Some(seconds) = timing.stolen.filter(|seconds| *seconds > 0.0) {
-        write!(
-            text,
-            "; the hypervisor took {seconds:.2} s from this virtual machine meanwhile: give it processors of its own"
-        )?;
-    }
-    writeln!(text)
 }

@@ -1,14 +1,16 @@
 //! `haptize reach`: where contact is, before anything is baked, and the grid that follows.
 
-use super::{Failure, Report, interrupt, output, tell, watch};
+use super::{
+    Failure, interrupt, output,
+    report::{Describe, Report, Text},
+    tell, watch,
+};
 use crate::{
-    dataset::replace_file,
     scene::Scene,
     sweep::{Aim, BackendChoice, Cost, JointReach, Pilot, Reach},
 };
+use serde::Serialize;
 use std::{
-    fmt::{self, Write},
-    io::Write as _,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering},
 };
@@ -69,31 +71,34 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let found = find(&scene, arguments, stop);
     interrupt::over();
     let Found { reach, pilot, costs, grid } = found?;
-    let mut json = serde_json::to_value(&reach)?;
-    json["pilot"] = serde_json::to_value(&pilot)?;
-    json["costs"] = serde_json::to_value(&costs)?;
-    json["grid"] = grid.as_ref().ok().cloned().into();
-    let mut text = String::new();
-    describe(&mut text, &reach, arguments)?;
-    describe_costs(&mut text, &costs)?;
-    let whole = grid.is_ok();
-    match grid {
-        Err(refusal) => {
-            json["refusal"] = refusal.as_str().into();
-            writeln!(text, "\n{refusal}")?;
-        }
-        Ok(table) => {
-            write!(text, "\n{table}")?;
-            if arguments.write {
-                let whole = format!("{}\n\n{table}", scene.text.trim_end());
-                Scene::parse(&whole, &arguments.scene)?;
-                replace_file(&arguments.scene, |file| file.write_all(whole.as_bytes()))?;
-                writeln!(text, "  added to     {}", arguments.scene.display())?;
-                json["written"] = arguments.scene.display().to_string().into();
-            }
-        }
-    }
-    Ok(Report { text, json, whole })
+    let (grid, refusal) = match grid {
+        Ok(grid) => (Some(grid), None),
+        Err(refusal) => (None, Some(refusal)),
+    };
+    let written = grid.as_deref().filter(|_| arguments.write).map(|grid| output::append(&scene, grid)).transpose()?;
+    let scene = arguments.scene.display().to_string();
+    let reached = Reached { reach, pilot, costs, grid, refusal, written, scene };
+    Report::of(&reached, reached.refusal.is_none())
+}
+
+/// Where contact is, and the grid that follows.
+#[derive(Serialize)]
+struct Reached {
+    #[serde(flatten)]
+    reach: Reach,
+    /// Absent where it was stopped.
+    pilot: Option<Pilot>,
+    costs: Vec<Cost>,
+    /// The table of the grid, as a scene has it.
+    grid: Option<String>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refusal: Option<String>,
+    /// The scene to which it was added.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    written: Option<String>,
+    #[serde(skip)]
+    scene: String,
 }
 
 /// `scene`, with a grid where it leaves that out: over the reach of its contact, for the default error; or, where
@@ -159,57 +164,46 @@ fn grid(reach: &Reach, pilot: &Pilot, based: &Scene, limit: usize) -> Result<Str
     Ok(reach.table(&pilot.spaced(based, cost.finer)))
 }
 
-fn describe(text: &mut String, reach: &Reach, arguments: &Arguments) -> fmt::Result {
-    let Reach { configurations, contact, contact_in_ranges, volume, body, shallow, deepest, depths, joints } = reach;
-    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    writeln!(
-        text,
-        "{}: {} of {configurations} configurations within the joint limits touch",
-        arguments.scene.display(),
-        percent(*contact)
-    )?;
-    writeln!(
-        text,
-        "  body         {:.1} mm across where it is least; contact up to {:.1} mm deep is to be held",
-        body * 1e3,
-        shallow * 1e3
-    )?;
-    writeln!(
-        text,
-        "  ranges       {} of the limits' volume, {} of it in contact, {:.1} mm deep at most",
-        percent(*volume),
-        percent(*contact_in_ranges),
-        deepest * 1e3
-    )?;
-    let shares: Vec<_> = depths.iter().map(|at| format!("{} to {:.1} mm", percent(at.share), at.depth * 1e3)).collect();
-    writeln!(text, "  depth        of all contact {}", shares.join(", "))?;
-    writeln!(
-        text,
-        "\njoint          range                   of limits               share in contact, by tenths of the limits [%]"
-    )?;
-    for JointReach { name, unit, limits, range, contact } in joints {
-        let ends = |[low, high]: &[f64; 2]| format!("{low:.3} to {high:.3} {unit}");
-        let shares: Vec<_> = contact.iter().map(|share| format!("{:>3.0}", 100.0 * share)).collect();
-        writeln!(text, "{name:<14} {:<23} {:<23} {}", ends(range), ends(limits), shares.join(" "))?;
+impl Describe for Reached {
+    fn describe(&self, text: &mut Text) {
+        let Reach { configurations, contact, contact_in_ranges, volume, body, shallow, deepest, depths, joints } =
+            &self.reach;
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let [body, shallow, deepest] = [body, shallow, deepest].map(|length| format!("{:.1} mm", length * 1e3));
+        text.line(format_args!(
+            "{}: {} of {configurations} configurations within the joint limits touch",
+            self.scene,
+            percent(*contact)
+        ));
+        text.row("body", format_args!("{body} across where it is least; contact up to {shallow} deep is to be held"));
+        let [volume, inside] = [volume, contact_in_ranges].map(|share| percent(*share));
+        text.row(
+            "ranges",
+            format_args!("{volume} of the limits' volume, {inside} of it in contact, {deepest} deep at most"),
+        );
+        let shares: Vec<_> =
+            depths.iter().map(|at| format!("{} to {:.1} mm", percent(at.share), at.depth * 1e3)).collect();
+        text.row("depth", format_args!("of all contact {}", shares.join(", ")));
+        let [ranges, limits] = ["range", "of limits"];
+        let shares = "share in contact, by tenths of the limits [%]";
+        text.line(format_args!("\n{:<14} {ranges:<23} {limits:<23} {shares}", "joint"));
+        for JointReach { name, unit, limits, range, contact } in joints {
+            let [range, limits] = [range, limits].map(|[low, high]| format!("{low:.3} to {high:.3} {unit}"));
+            let shares: Vec<_> = contact.iter().map(|share| format!("{:>3.0}", 100.0 * share)).collect();
+            text.line(format_args!("{name:<14} {range:<23} {limits:<23} {}", shares.join(" ")));
+        }
+        if !self.costs.is_empty() {
+            text.line("\nrms error      points        solving from rest   file");
+        }
+        for Cost { relative, points, seconds, bytes, is_known, .. } in &self.costs {
+            let doubt = if *is_known { "" } else { "   far beyond what was tried" };
+            let [error, points] = [format!("{} %", 100.0 * relative), format!("{points:.2e}")];
+            let [time, size] = [watch::duration(*seconds), watch::megabytes(*bytes as usize)];
+            text.line(format_args!("{error:<14} {points:<13} {time:<19} {size}{doubt}"));
+        }
+        for found in self.grid.iter().chain(&self.refusal) {
+            text.line(format_args!("\n{}", found.trim_end()));
+        }
+        self.written.iter().for_each(|scene| text.row("added to", scene));
     }
-    Ok(())
-}
-
-fn describe_costs(text: &mut String, costs: &[Cost]) -> fmt::Result {
-    if costs.is_empty() {
-        return Ok(());
-    }
-    writeln!(text, "\nrms error      points        solving from rest   file")?;
-    for Cost { relative, points, seconds, bytes, is_known, .. } in costs {
-        let doubt = if *is_known { "" } else { "   far beyond what was tried" };
-        writeln!(
-            text,
-            "{:<14} {:<13} {:<19} {}{doubt}",
-            format!("{} %", 100.0 * relative),
-            format!("{points:.2e}"),
-            watch::duration(*seconds),
-            watch::megabytes(*bytes as usize)
-        )?;
-    }
-    Ok(())
 }

@@ -1,8 +1,12 @@
 //! `haptize bake --max-error ERROR --refine LEVELS`: the scene's grid, refined where the interpolation errs.
 
 use super::{
-    Failure, Report, info, tell,
-    watch::{counted, left_to_cpu, lowered, megabytes},
+    Failure,
+    baked::{describe_error, describe_left_to_cpu},
+    output::Replaced,
+    report::{Describe, Report, Text},
+    tell,
+    watch::{counted, megabytes},
 };
 use crate::{
     contact::{Backend, Model},
@@ -11,12 +15,13 @@ use crate::{
     scene::Scene,
     store::Store,
     sweep::{
-        Aim, BackendChoice, ChosenBackend, CpuBackend, build_object, check_algorithm, grid_of,
-        refine::{Judge, Refine, Refined},
+        Aim, BackendChoice, ChosenBackend, CpuBackend, Lowered, build_object, check_law, grid_of,
+        refine::{Judge, Refine},
         sample,
     },
 };
-use std::{fmt::Write, path::Path, time::Instant};
+use serde::Serialize;
+use std::{path::Path, time::Instant};
 
 /// Configurations in contact by which the refinement is stopped, and as many others at which its error is measured (1):
 /// with fewer the rms varies by more than a tenth.
@@ -34,22 +39,88 @@ pub struct RefinementGoal<'a> {
     pub output: &'a Path,
 }
 
+/// A dataset that was refined.
+#[derive(Serialize)]
+struct BakedStore {
+    file: String,
+    /// Nodes, over all levels and of each.
+    nodes: usize,
+    by_level: Vec<usize>,
+    equilibria: usize,
+    solved: usize,
+    blocks: usize,
+    /// Memory of the store, and its maximum as it was predicted (bytes).
+    memory: usize,
+    most_memory: usize,
+    /// Rms error that was measured, and the one that was asked for, over the rms torque (1).
+    error: Option<f64>,
+    aim: f64,
+    /// Points of a uniform grid of the finest spacing.
+    uniform: usize,
+    rounds: usize,
+    lowered: Option<Lowered>,
+    backend: String,
+    adapter: String,
+    left_to_cpu: usize,
+    warnings: Vec<String>,
+    kept: bool,
+    /// Size of the file (bytes).
+    bytes: usize,
+    /// Wall time (s).
+    seconds: f64,
+    #[serde(skip)]
+    measured: MeasuredError,
+    #[serde(flatten)]
+    replaced: Option<Replaced>,
+}
+
+impl Describe for BakedStore {
+    fn describe(&self, text: &mut Text) {
+        let Self { file, nodes, by_level, equilibria, solved, uniform, rounds, backend, adapter, .. } = self;
+        text.line(format_args!("{file}: {nodes} nodes, {by_level:?} by level, {:.1} s", self.seconds));
+        describe_error(text, Some(&self.measured), Some(self.aim));
+        text.row(
+            "nodes",
+            format_args!(
+                "{:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} solved, \
+                 {equilibria} equilibria, {}, on {backend} ({adapter})",
+                *uniform as f64 / (*nodes).max(1) as f64,
+                counted(*rounds, ["round", "rounds"])
+            ),
+        );
+        describe_left_to_cpu(text, self.left_to_cpu);
+        self.lowered.describe(text);
+        let [disk, memory] = [self.bytes, self.memory].map(megabytes);
+        text.row("bytes", format_args!("{disk} on the disk, {memory} in memory"));
+        if !self.kept {
+            text.line("  the aim was missed: the dataset is whole, and errs by more; give more levels or more points");
+        }
+        self.replaced.describe(text);
+    }
+}
+
 /// Refines, measures and writes. Exit code 1 where the error that is measured is larger than asked for.
-pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -> Result<Report, Failure> {
+pub fn run(
+    scene: &Scene,
+    goal: &RefinementGoal<'_>,
+    backend: BackendChoice,
+    replaced: Option<Replaced>,
+) -> Result<Report, Failure> {
     let began = Instant::now();
-    check_algorithm(scene)?;
-    let aim = wanted.aim.checked(scene)?;
+    check_law(scene)?;
+    let aim = goal.aim.checked(scene)?;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     model.with_tangent = true;
+    model.with_slip = scene.haptics.friction.is_some();
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
     let mut judges = [seen, Judge::new(scene, &model, 2, JUDGED)?];
     let aim = aim.relative(judges[0].torque());
     let mut refine =
-        Refine { model: &model, base: grid_of(scene), levels: wanted.levels, aim, most: wanted.most, batch: 1 };
+        Refine { model: &model, base: grid_of(scene), levels: goal.levels, aim, most: goal.most, batch: 1 };
     let most = uniform(&refine).min(refine.most);
     let mut backend = ChosenBackend::open(backend.for_work(each * most as f64), &model)?;
     refine.batch = backend.chunk();
@@ -57,36 +128,42 @@ pub fn run(scene: &Scene, wanted: &RefinementGoal<'_>, backend: BackendChoice) -
     let most_memory = announce(&refine, &judges[0], each);
     let refined = refine.fill(&mut judges, &mut backend)?;
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
-    let measured = judges[1].measure(&refined.store);
-    let error = measured.relative();
-    let (kept, file) = (measured.keeps(aim), wanted.output.display());
-    let memory = refined.store.bytes();
-    let mut json = serde_json::json!({
-        "file": file.to_string(), "nodes": refined.nodes, "by_level": refined.by_level,
-        "equilibria": refined.equilibria, "solved": refined.solved, "blocks": refined.store.blocks().len(),
-        "memory": memory, "most_memory": most_memory, "error": error, "aim": aim, "uniform": uniform(&refine),
-        "rounds": refined.rounds, "lowered": refined.lowered, "backend": backend.name(), "adapter": backend.adapter(),
-        "left_to_cpu": backend.left_to_cpu(), "warnings": refined.notices, "kept": kept,
-    });
-    let mut text = String::new();
-    describe(&mut text, &refine, &refined, &measured, &backend)?;
-    let (backend, adapter, notices) = (backend.name().to_owned(), backend.adapter(), refined.notices);
-    let (error, aim) = (Some(measured), Some(aim));
-    let provenance = Provenance { notices, backend, adapter, error, aim, ..CpuBackend::provenance(scene) };
-    refined.store.save(&refine.base, Some(&Surface::of(&object)), &scene.text, &provenance, wanted.output)?;
-    let (seconds, bytes) = (began.elapsed().as_secs_f64(), std::fs::metadata(wanted.output)?.len() as usize);
-    json["bytes"] = bytes.into();
-    json["seconds"] = seconds.into();
-    let (nodes, by_level) = (refined.nodes, refined.by_level);
-    text.insert_str(0, &format!("{file}: {nodes} nodes, {by_level:?} by level, {seconds:.1} s\n"));
-    writeln!(text, "  bytes        {} on the disk, {} in memory", megabytes(bytes), megabytes(memory))?;
-    if !kept {
-        writeln!(
-            text,
-            "  the aim was missed: the dataset is whole, and errs by more; give more levels or more points"
-        )?;
-    }
-    Ok(Report { text, json, whole: kept })
+    let measured = judges[1].measure(&refined.store, &model);
+    let (kept, memory, blocks) = (measured.keeps(aim), refined.store.bytes(), refined.store.blocks().len());
+    let provenance = Provenance {
+        notices: refined.notices.clone(),
+        backend: backend.name().to_owned(),
+        adapter: backend.adapter(),
+        error: Some(measured.clone()),
+        aim: Some(aim),
+        ..CpuBackend::provenance(scene)
+    };
+    refined.store.save(&refine.base, Some(&Surface::of(&object)), &scene.text, &provenance, goal.output)?;
+    let baked = BakedStore {
+        file: goal.output.display().to_string(),
+        nodes: refined.nodes,
+        by_level: refined.by_level,
+        equilibria: refined.equilibria,
+        solved: refined.solved,
+        blocks,
+        memory,
+        most_memory,
+        error: measured.relative(),
+        aim,
+        uniform: uniform(&refine),
+        rounds: refined.rounds,
+        lowered: refined.lowered,
+        backend: provenance.backend,
+        adapter: provenance.adapter,
+        left_to_cpu: backend.left_to_cpu(),
+        warnings: refined.notices,
+        kept,
+        bytes: std::fs::metadata(goal.output)?.len() as usize,
+        seconds: began.elapsed().as_secs_f64(),
+        measured,
+        replaced,
+    };
+    Report::of(&baked, kept)
 }
 
 /// Points of a uniform grid of the finest spacing.
@@ -104,7 +181,7 @@ fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
         refine.base.points()
     ));
     let most = uniform.min(refine.most);
-    let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most);
+    let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most, refine.model.with_slip);
     let time = each.map_or(String::new(), |each| format!("{:.0} s to solve, ", (each * most as f64).ceil()));
     tell(format_args!(
         "haptize: that is at most {most} nodes, which would take about {time}{} of memory, {} more while they are \
@@ -114,27 +191,4 @@ fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
         megabytes(disk)
     ));
     memory
-}
-
-/// Describes what was filled, for people.
-fn describe(
-    text: &mut String,
-    refine: &Refine<'_>,
-    refined: &Refined,
-    measured: &MeasuredError,
-    backend: &ChosenBackend<'_>,
-) -> std::fmt::Result {
-    let uniform = uniform(refine);
-    let Refined { nodes, solved, equilibria, rounds, .. } = refined;
-    let (name, adapter) = (backend.name(), backend.adapter());
-    info::error(text, Some(measured), Some(refine.aim))?;
-    writeln!(
-        text,
-        "  nodes        {:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} \
-         solved, {equilibria} equilibria, {}, on {name} ({adapter})",
-        uniform as f64 / (*nodes).max(1) as f64,
-        counted(*rounds, ["round", "rounds"])
-    )?;
-    left_to_cpu(text, backend.left_to_cpu())?;
-    lowered(text, refined.lowered)
 }

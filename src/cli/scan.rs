@@ -1,11 +1,12 @@
 //! `haptize scan`: a real object haptized by touching it. The rig that ships is simulated, and says so.
 
 use super::{
-    Failure, Report,
+    Failure,
     bar::Bar,
     interrupt,
     keyboard::Keyboard,
-    output::{self, Content},
+    output::{self, Content, Replaced},
+    report::{Describe, Report, Text},
     shell, tell,
 };
 use crate::{
@@ -20,6 +21,7 @@ use crate::{
     },
     scene::ScanScene,
 };
+use serde::Serialize;
 use std::{
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
@@ -93,24 +95,47 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     bar.finish();
     interrupt::over();
-    let report = result?;
-    let mut json = serde_json::to_value(&report)?;
-    json["file"] = output.display().to_string().into();
-    let mut text = describe(&output, &report);
-    if !report.whole {
-        text += &format!(
-            "  interrupted; continue: haptize scan {} -o {} --resume\n",
-            shell::file(&arguments.scene),
-            shell::file(&output)
-        );
+    let (report, file) = (result?, output.display().to_string());
+    let [scene, log] = [&arguments.scene, &output].map(|file| shell::file(file));
+    let next = (!report.whole).then(|| format!("haptize scan {scene} -o {log} --resume"));
+    let scanned = Scanned { report, file, next };
+    Report::of(&scanned, scanned.report.whole)
+}
+
+/// An object that was scanned.
+#[derive(Serialize)]
+struct Scanned {
+    #[serde(flatten)]
+    report: ScanReport,
+    file: String,
+    /// The command that continues a scan that was interrupted.
+    #[serde(skip)]
+    next: Option<String>,
+}
+
+impl Describe for Scanned {
+    fn describe(&self, text: &mut Text) {
+        let Self { report, file, next } = self;
+        let ScanReport { steady, points, seconds, rig, .. } = report;
+        text.line(format_args!("{file}: {steady} of {points} points measured in {seconds:.0} s on the rig's clock"));
+        text.row("rig", rig);
+        for (count, what) in [
+            (report.unsteady, "not steady in time, left out by gridize"),
+            (report.limited, "stopped by a limit, left out by gridize"),
+            (report.unreachable, "not reached by the joints"),
+        ] {
+            if count > 0 {
+                text.row("note", format_args!("{count} points {what}"));
+            }
+        }
+        next.iter().for_each(|command| text.row("interrupted", format_args!("continue: {command}")));
     }
-    Ok(Report { text, json, whole: report.whole })
 }
 
 /// Writes the plan of `scene` to `file`.
 fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<Report, Failure> {
     let content = if output::is_mcap(file) { Content::Log } else { Content::Product };
-    let earlier = output::check(file, content, [arguments.scene.as_path()])?;
+    let replaced = output::check(file, content, [arguments.scene.as_path()])?;
     let control = &scene.scan.control;
     let dwell = arguments.dwell.unwrap_or(control.window + control.average);
     if !(dwell > 0.0 && dwell <= LONGEST) {
@@ -126,22 +151,43 @@ fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<R
     });
     written
         .map_err(|error| format!("cannot write {}: {error}; free some space or give another place", file.display()))?;
-    let (rows, seconds, unreachable) = (trajectory.rows.len(), trajectory.duration(), plan.unreachable.len());
-    let mut text = format!(
-        "{}: {rows} rows through {} points in {seconds:.0} s, {dwell} s at each; {unreachable} points are not reached \
-         by the joints\n  note         limits of torque and speed are the robot's own: nothing of haptize watches it\n",
-        file.display(),
-        plan.points - unreachable
-    );
-    let mut json = serde_json::json!({
-        "file": file.display().to_string(),
-        "rows": rows,
-        "points": plan.points,
-        "unreachable": unreachable,
-        "seconds": seconds,
-    });
-    earlier.tell(&mut text, &mut json);
-    Ok(Report { text, json, whole: true })
+    Report::new(&WrittenPlan {
+        file: file.display().to_string(),
+        rows: trajectory.rows.len(),
+        points: plan.points,
+        unreachable: plan.unreachable.len(),
+        seconds: trajectory.duration(),
+        dwell,
+        replaced,
+    })
+}
+
+/// A plan written as a trajectory.
+#[derive(Serialize)]
+struct WrittenPlan {
+    file: String,
+    rows: usize,
+    points: usize,
+    /// Points that the joints do not reach.
+    unreachable: usize,
+    /// Duration, and how long it rests at each point (s).
+    seconds: f64,
+    dwell: f64,
+    #[serde(flatten)]
+    replaced: Option<Replaced>,
+}
+
+impl Describe for WrittenPlan {
+    fn describe(&self, text: &mut Text) {
+        let Self { file, rows, points, unreachable, seconds, dwell, replaced } = self;
+        let reached = points - unreachable;
+        text.line(format_args!(
+            "{file}: {rows} rows through {reached} points in {seconds:.0} s, {dwell} s at each; {unreachable} points \
+             are not reached by the joints"
+        ));
+        text.row("note", "limits of torque and speed are the robot's own: nothing of haptize watches it");
+        replaced.describe(text);
+    }
 }
 
 /// How a scan goes: by default through the whole plan, into a new log.
@@ -228,25 +274,4 @@ fn go(mut session: Session<'_>, course: Course, plan: &Plan, logged: &[ScanRow])
         Some(seconds) => session.guided(seconds, logged),
         None => session.scan(plan, logged),
     }?)
-}
-
-fn describe(output: &Path, report: &ScanReport) -> String {
-    let mut text = format!(
-        "{}: {} of {} points measured in {:.0} s on the rig's clock\n  rig          {}\n",
-        output.display(),
-        report.steady,
-        report.points,
-        report.seconds,
-        report.rig
-    );
-    for (count, what) in [
-        (report.unsteady, "not steady in time, left out by gridize"),
-        (report.limited, "stopped by a limit, left out by gridize"),
-        (report.unreachable, "not reached by the joints"),
-    ] {
-        if count > 0 {
-            text += &format!("  note         {count} points {what}\n");
-        }
-    }
-    text
 }

@@ -1,7 +1,14 @@
 //! `haptize view`: the window, or one picture of it.
 
-use super::{Failure, Report};
+use super::{Failure, report::Report};
+#[cfg(feature = "viewer")]
+use super::{
+    output::Replaced,
+    report::{Describe, Text},
+};
 use crate::device::Address;
+#[cfg(feature = "viewer")]
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Arguments of `haptize view`.
@@ -69,12 +76,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let shown = viewer::open(start, device);
         interrupt::over();
         shown?;
-        return Ok(Report { text: String::new(), json: serde_json::json!({}), whole: true });
+        return Report::new(&Shown { file: None, replaced: None });
     };
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(format!("{}: the picture is a PNG file: give a name that ends in .png", file.display()).into());
     }
-    let earlier = output::check(file, Content::Product, arguments.file.as_deref())?;
+    let replaced = output::check(file, Content::Product, arguments.file.as_deref())?;
     if !(0.0..=60.0).contains(&arguments.time) {
         return Err(format!("cannot play {} s: give --time from 0 to 60", arguments.time).into());
     }
@@ -92,10 +99,26 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         ..Picture::default()
     };
     viewer::screenshot(&start, &picture, file)?;
-    let (mut text, mut json) =
-        (format!("wrote {}\n", file.display()), serde_json::json!({ "file": file.display().to_string() }));
-    earlier.tell(&mut text, &mut json);
-    Ok(Report { text, json, whole: true })
+    Report::new(&Shown { file: Some(file.display().to_string()), replaced })
+}
+
+/// What was shown.
+#[cfg(feature = "viewer")]
+#[derive(Serialize)]
+struct Shown {
+    /// The picture, if one was drawn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<String>,
+    #[serde(flatten)]
+    replaced: Option<Replaced>,
+}
+
+#[cfg(feature = "viewer")]
+impl Describe for Shown {
+    fn describe(&self, text: &mut Text) {
+        self.file.iter().for_each(|file| text.line(format_args!("wrote {file}")));
+        self.replaced.describe(text);
+    }
 }
 
 /// Says how to get the viewer.

@@ -1,20 +1,13 @@
-//! A sweep watched from its beginning to its report: what it is going to take, progress, and what it found.
+//! A sweep watched: what it is going to take, its progress, and whether anything touches.
 
-use super::{Failure, bar::Bar, info, interrupt, tell};
+use super::{Failure, bar::Bar, interrupt, tell};
 use crate::{
     dataset::Dataset,
     scene::Scene,
-    sweep::{
-        BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, Iterations, Lowered, MOST_CONFIGURATIONS,
-        Progress, SweepReport,
-    },
+    sweep::{BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, MOST_CONFIGURATIONS, Progress},
 };
 use clap::builder::RangedU64ValueParser;
-use std::{
-    fmt::{self, Write},
-    path::Path,
-    time::SystemTime,
-};
+use std::time::SystemTime;
 
 /// Reads a number of random configurations at which an error is measured: too large a one is told before hours of work.
 pub fn configurations() -> RangedU64ValueParser<usize> {
@@ -45,11 +38,6 @@ pub fn watched<T, E: Into<Failure>>(
     result.map_err(Into::into)
 }
 
-/// Prints the warnings of a bake on standard error.
-pub fn warn(report: &SweepReport) {
-    report.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
-}
-
 /// What a dataset is that touches nothing, and what to do about it.
 const FREE: &str = "nothing touches: at none of the grid's points does the arm meet the object";
 
@@ -63,82 +51,6 @@ pub fn warn_of_free_space(dataset: &Dataset) -> Result<Option<Clearance>, Failur
         tell(format_args!("haptize: {FREE}; {clearance}. {REMEDY}"));
     }
     Ok(clearance)
-}
-
-/// Warns of the dataset of `report`, just baked into `file`, if nothing touches. Returns whether that is no failure.
-pub fn touches(
-    report: &SweepReport,
-    file: &Path,
-    allow_free: bool,
-    json: &mut serde_json::Value,
-) -> Result<bool, Failure> {
-    if report.contact_points > 0 {
-        return Ok(true);
-    }
-    json["clearance"] = serde_json::to_value(warn_of_free_space(&Dataset::load(file)?)?)?;
-    if !allow_free {
-        tell(format_args!(
-            "haptize: the dataset is whole, and its torque is zero everywhere; --allow-free takes that for success"
-        ));
-    }
-    Ok(allow_free)
-}
-
-/// Describes what was baked into `file`, for people; `aim`: the rms error over the rms torque that was asked for, if
-/// any.
-pub fn describe(text: &mut String, file: &Path, report: &SweepReport, aim: Option<f64>) -> fmt::Result {
-    let SweepReport { points, contact_points, unconverged, overflowed, .. } = report;
-    let SweepReport { seconds, configurations_per_second, algorithm, backend, adapter, left_to_cpu, .. } = report;
-    let Iterations { mean, max } = report.iterations;
-    let lost = unconverged + overflowed;
-    writeln!(text, "{}: {points} points, {contact_points} in contact, {lost} not converged", file.display())?;
-    writeln!(
-        text,
-        "  solved       in {seconds:.2} s, {configurations_per_second:.0} configurations a second, {algorithm} on \
-         {backend} ({adapter})"
-    )?;
-    if let Some(forecast) = report.forecast {
-        let size = std::fs::metadata(file).map_or(0, |file| file.len() as usize);
-        let time = forecast.seconds.map_or(String::new(), |seconds| {
-            format!("{} from rest (predicted {}), ", duration(report.solving_seconds), duration(seconds))
-        });
-        writeln!(text, "  forecast     {time}{} of disk (predicted {})", megabytes(size), megabytes(forecast.disk))?;
-    }
-    self::left_to_cpu(text, *left_to_cpu)?;
-    writeln!(
-        text,
-        "  residual     at most {:.1e} where converged; iterations {mean:.1} on average, {max} at most",
-        report.max_residual
-    )?;
-    if let Some(skin) = report.skin {
-        writeln!(text, "  skin         {skin}")?;
-    }
-    info::mesh_ripple(text, report.mesh_ripple)?;
-    lowered(text, report.lowered)?;
-    info::error(text, report.error.as_ref(), aim)
-}
-
-/// Describes how many configurations a GPU left to the CPU.
-pub fn left_to_cpu(text: &mut String, count: usize) -> fmt::Result {
-    if count == 0 {
-        return Ok(());
-    }
-    writeln!(text, "  by the CPU   {count} of them, which the GPU did not decide")
-}
-
-/// Describes what the search for lower equilibria did.
-pub fn lowered(text: &mut String, lowered: Option<Lowered>) -> fmt::Result {
-    let Some(Lowered { points, converged, greatest, rounds, searches, seconds }) = lowered else { return Ok(()) };
-    let which = match points {
-        0 => "no point by neighbours' equilibria".to_owned(),
-        _ => format!(
-            "{} by neighbours' equilibria, {converged} unconverged from rest, energy by at most {:.1} %",
-            counted(points, ["point", "points"]),
-            100.0 * greatest
-        ),
-    };
-    let (rounds, searches) = (counted(rounds, ["round", "rounds"]), counted(searches, ["search", "searches"]));
-    writeln!(text, "  lowered      {which}; {rounds}, {searches}, {seconds:.2} s")
 }
 
 /// A number with its noun, in the singular or the plural.

@@ -52,7 +52,7 @@ impl AdapterChoice {
 }
 
 /// One adapter, in words for `doctor` and for a dataset's provenance.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct AdapterSummary {
     /// Such as `llvmpipe (LLVM 15.0.6, 256 bits)`.
     pub name: String,
@@ -68,6 +68,7 @@ pub struct AdapterSummary {
     /// True for a GPU made of silicon.
     pub hardware: bool,
     /// Largest buffer that one binding reaches (B).
+    #[serde(rename = "binding_limit_bytes")]
     pub binding_limit: u64,
 }
 

@@ -1,10 +1,10 @@
 //! The error that the cubes of a lattice make, estimated on coarser ones.
 //!
-//! Two lattices whose cubes differ by a factor r differ in compliance by e. Roache's grid convergence index states
-//! `3 e / (r^p - 1)` as the error of the finer one, p being the order of convergence (Journal of Fluids Engineering 116,
+//! Two lattices whose cubes differ by a factor r differ in compliance by e. Roache's grid convergence index states `3
+//! e / (r^p - 1)` as the error of the finer one, p being the order of convergence (Journal of Fluids Engineering 116,
 //! 1994). Its factor 3 is for two lattices, from which the order cannot be told: it is 2 here, what quadratic elements
-//! have in energy under a pressure whose edge their nodes do not follow. Coarser cubes take a tenth of the work of those
-//! in question; finer ones would take some thirty times as much.
+//! have in energy under a pressure whose edge their nodes do not follow. Coarser cubes take a tenth of the work of
+//! those in question; finer ones would take some thirty times as much.
 
 use super::{Compliance, Object, lattice, topology};
 use crate::scene::{ElasticSpec, Material, ObjectSpec};
@@ -51,16 +51,16 @@ impl fmt::Display for LatticeError {
             self.relative * 1e2
         )?;
         if self.is_large() {
-            write!(f, ": set object.elasticity.cell = {:.2e}", self.cell / 2.0)?;
+            write!(f, ": set object.elasticity.cell = {:.4}", self.cell / 2.0)?;
         }
         Ok(())
     }
 }
 
 impl Object {
-    /// Estimates by how much the lattice in this object, built of `spec`, errs under a pressure around a typical node of
-    /// `compliance`, that of median softness: on corners errors are greater, and contact is rare. None if no lattice fills it, or if the coarser one is refused, as where it
-    /// misses an inclusion.
+    /// Estimates by how much the lattice in this object, built of `spec`, errs under a pressure around a typical node
+    /// of `compliance`, that of median softness: on corners errors are greater, and contact is rare. None if no lattice
+    /// fills it, or if the coarser one is refused, as where it misses an inclusion.
     #[must_use]
     pub fn lattice_error(&self, spec: &ObjectSpec, compliance: &Compliance) -> Option<LatticeError> {
         let Material::Elastic(elastic) = &spec.material else { return None };

@@ -1,8 +1,8 @@
 //! Energy accounts of the haptic loop: who gave, who took, and whether anything came from nowhere.
 //!
 //! Over any sequence of steps T_k, the proxy with its coupling obeys to rounding
-//! `Delta(kinetic + spring + bristles) = coupling_work + channel_work + field_work + stop_work - proxy_dissipation -
-//! coupling_dissipation - friction_dissipation - contact_dissipation - control_dissipation`,
+//! `Delta(kinetic + spring + presliding) = coupling_work + channel_work + field_work + stop_work - proxy_dissipation -
+//! coupling_dissipation - friction_dissipation - control_dissipation`,
 //! so that `coupling_work + channel_work + field_work >= 0` from rest: it never gives more than was put in (sections 3,
 //! 3.1). Terms of effects that the scene does not name stay zero.
 //!
@@ -45,12 +45,10 @@ pub struct Accounts {
     pub proxy_dissipation: f64,
     /// Taken by the coupling's damping Bvc.
     pub coupling_dissipation: f64,
-    /// Kept in the bristles of contact friction.
-    pub bristles: f64,
+    /// Kept by contact friction before it slides.
+    pub presliding: f64,
     /// Taken by contact friction.
     pub friction_dissipation: f64,
-    /// Taken by contact damping.
-    pub contact_dissipation: f64,
     /// Taken by the passivity controller at the object's port.
     pub control_dissipation: f64,
     /// Energy U stored in the object, interpolated; zero for datasets without it.
@@ -78,10 +76,8 @@ pub(super) struct Extra {
     pub channels: JointVector,
     /// Work of contact friction on the proxy (J).
     pub friction_work: f64,
-    /// Energy in the bristles after the step (J).
-    pub bristles: f64,
-    /// Taken by contact damping (J).
-    pub contact_dissipation: f64,
+    /// Energy that friction keeps after the step (J).
+    pub presliding: f64,
     /// Taken by the passivity controller (J).
     pub control_dissipation: f64,
 }
@@ -89,12 +85,12 @@ pub(super) struct Extra {
 impl Accounts {
     /// Every account by its name, in the order of their balance, and what it leaves; none where it is not known (J).
     #[must_use]
-    pub fn named(&self) -> [(&'static str, Option<f64>); 20] {
+    pub fn named(&self) -> [(&'static str, Option<f64>); 19] {
         [
             ("initial", Some(self.initial)),
             ("kinetic", Some(self.kinetic)),
             ("spring", Some(self.spring)),
-            ("bristles", Some(self.bristles)),
+            ("presliding", Some(self.presliding)),
             ("coupling work", Some(self.coupling_work)),
             ("channel work", Some(self.channel_work)),
             ("field work", Some(self.field_work)),
@@ -102,7 +98,6 @@ impl Accounts {
             ("proxy dissipation", Some(self.proxy_dissipation)),
             ("coupling dissipation", Some(self.coupling_dissipation)),
             ("friction dissipation", Some(self.friction_dissipation)),
-            ("contact dissipation", Some(self.contact_dissipation)),
             ("control dissipation", Some(self.control_dissipation)),
             ("residual", Some(self.residual())),
             ("exchanged", Some(self.exchanged)),
@@ -118,12 +113,9 @@ impl Accounts {
     #[must_use]
     pub fn residual(&self) -> f64 {
         let given = self.initial + self.absorbed() + self.stop_work;
-        let taken = self.proxy_dissipation
-            + self.coupling_dissipation
-            + self.friction_dissipation
-            + self.contact_dissipation
-            + self.control_dissipation;
-        given - taken - self.kinetic - self.spring - self.bristles
+        let taken =
+            self.proxy_dissipation + self.coupling_dissipation + self.friction_dissipation + self.control_dissipation;
+        given - taken - self.kinetic - self.spring - self.presliding
     }
 
     /// Returns the energy that the proxy and its coupling have taken in and not given back (J): never less than
@@ -159,8 +151,7 @@ impl Accounts {
     /// Returns what damping, friction, stops and controller have taken from the proxy (J).
     #[must_use]
     pub fn taken_from_field(&self) -> f64 {
-        self.proxy_dissipation + self.friction_dissipation + self.contact_dissipation + self.control_dissipation
-            - self.stop_work
+        self.proxy_dissipation + self.friction_dissipation + self.control_dissipation - self.stop_work
     }
 
     /// Books the state at a tick: what the object has stored, if the dataset holds it, and whether it is touched.
@@ -222,11 +213,9 @@ impl Accounts {
             self.exchanged += damper.abs() + heat + drag + field.abs() + channel.abs();
         }
         self.stop_work += step.stop_work;
-        self.friction_dissipation += self.bristles - extra.bristles - extra.friction_work;
-        self.bristles = extra.bristles;
-        self.contact_dissipation += extra.contact_dissipation;
+        self.friction_dissipation += self.presliding - extra.presliding - extra.friction_work;
+        self.presliding = extra.presliding;
         self.control_dissipation += extra.control_dissipation;
-        self.exchanged +=
-            step.stop_work.abs() + extra.friction_work.abs() + extra.contact_dissipation + extra.control_dissipation;
+        self.exchanged += step.stop_work.abs() + extra.friction_work.abs() + extra.control_dissipation;
     }
 }

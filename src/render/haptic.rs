@@ -8,8 +8,7 @@
 //! [`Haptics::restart`]. So it is when the passivity observer of the device's port finds that the hand has been given
 //! energy from nowhere ([`Fault::Energy`]).
 //!
-//! What the scene may name beside (channels, controller, effects at contacts) is decided once, in [`Haptics::new`] and
-//! [`Haptics::with_effects`]; what it does not name has no state and does no work.
+//! What the scene may name beside (channels, controller, friction) is decided once, in [`Haptics::new`]; what it does not name has no state and does no work.
 
 pub use super::inputs::Inputs;
 use super::{
@@ -17,8 +16,8 @@ use super::{
     channels::{ChannelState, Channels},
     control::PassivityControl,
     coupling::Coupling,
-    effects::{ContactEffects, EffectState, Pending},
     flags::{Fault, Flags},
+    friction::{Friction, FrictionState, Pending},
     npmi::{Motion, Npmi},
     source::{ContactSession, TorqueSource},
     torque_history::TorqueHistory,
@@ -26,7 +25,6 @@ use super::{
 };
 use crate::{
     JointVector,
-    contact::NodeForce,
     field::{Sample, range::HaptizedRange},
     scene::HapticsSpec,
 };
@@ -44,7 +42,7 @@ pub struct Haptics {
     /// Absent unless the scene names them.
     channels: Option<Channels>,
     control: Option<PassivityControl>,
-    effects: Option<ContactEffects>,
+    friction: Option<Friction>,
     watchdog: Watchdog,
     torque_limit: JointVector,
     torque_rate_limit: JointVector,
@@ -68,7 +66,7 @@ pub struct State {
     fault: Option<Fault>,
     accounts: Accounts,
     channels: Option<ChannelState>,
-    effects: Option<EffectState>,
+    friction: Option<FrictionState>,
 }
 
 /// Output of a tick. All but `torque` is for recording and drawing.
@@ -137,7 +135,7 @@ impl Haptics {
             coupling,
             channels,
             control,
-            effects: None,
+            friction: spec.friction.as_ref().map(Friction::new),
             watchdog,
             torque_limit,
             torque_rate_limit,
@@ -145,22 +143,10 @@ impl Haptics {
         })
     }
 
-    /// The same loop with `effects` at the contacts.
-    #[must_use]
-    pub fn with_effects(self, effects: Option<ContactEffects>) -> Self {
-        Self { effects, ..self }
-    }
-
     /// The same loop with a proxy that stays in `range`, a range of the same dataset.
     #[must_use]
     pub fn with_range(self, range: HaptizedRange) -> Self {
         Self { range, ..self }
-    }
-
-    /// The effects at the contacts, if the scene names any.
-    #[must_use]
-    pub fn effects(&self) -> Option<&ContactEffects> {
-        self.effects.as_ref()
     }
 
     /// Number of joints d.
@@ -198,7 +184,7 @@ impl Haptics {
             fault: None,
             accounts: Accounts::default(),
             channels: None,
-            effects: self.effects.as_ref().map(ContactEffects::start),
+            friction: None,
         };
         self.begin(&mut state, position);
         Ok(state)
@@ -225,9 +211,7 @@ impl Haptics {
         let initial = self.coupling.spring_energy(&state.motion.position, position);
         state.accounts = Accounts { initial, ..Accounts::default() };
         state.channels = self.channels.as_ref().map(Channels::start);
-        if let Some(effects) = &mut state.effects {
-            effects.release();
-        }
+        state.friction = self.friction.map(|_| FrictionState::at_rest(self.joints()));
     }
 
     /// One tick. Over a scene that is solved in every tick this makes room for that each time: a session has its own
@@ -281,7 +265,7 @@ impl Haptics {
         state.held.push(&torque);
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
-        let stopped = self.move_proxy(state, interval, &velocity, &sample, contact.forces());
+        let stopped = self.move_proxy(state, interval, &velocity, &sample, contact);
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
     }
 
@@ -308,15 +292,15 @@ impl Haptics {
         torque
     }
 
-    /// One step of the proxy over `interval` (s), booked; what stopped it. The device moves at `velocity`, and contact
-    /// forces are `solved` at the proxy.
+    /// One step of the proxy over `interval` (s), booked; what stopped it. The device moves at `velocity`, and `contact`
+    /// was sampled at the proxy.
     fn move_proxy(
         &self,
         state: &mut State,
         interval: f64,
         velocity: &JointVector,
         sample: &Sample,
-        solved: &[NodeForce],
+        contact: &mut ContactSession<'_>,
     ) -> Flags {
         let stage = self.npmi.stage(&state.motion, interval);
         let limits = self.npmi.limits();
@@ -325,8 +309,7 @@ impl Haptics {
         let mut extra = Extra {
             channels: JointVector::zeros(self.joints()),
             friction_work: 0.0,
-            bristles: 0.0,
-            contact_dissipation: 0.0,
+            presliding: 0.0,
             control_dissipation: 0.0,
         };
         // After a fault nothing is known of the hand any more: its channel falls silent.
@@ -339,11 +322,12 @@ impl Haptics {
             rate = control.proxy_rate(&state.accounts, interval, &state.motion);
             stage.add_inertia(rate, &mut load.damping);
         }
-        let step = match (&self.effects, &mut state.effects) {
-            (Some(effects), Some(memory)) => {
-                let share = if sample.contact { sample.share } else { 0.0 };
-                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, load, share, solved };
-                effects.step(pending, memory, &mut state.motion, &mut extra)
+        let step = match (&self.friction, &mut state.friction) {
+            (Some(friction), Some(memory)) => {
+                let slip = contact.slip(&state.motion.position, sample);
+                let velocity = state.proxy_velocity;
+                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, velocity, load };
+                friction.step(&pending, &slip, memory, &mut state.motion, &mut extra)
             }
             _ => self.npmi.advance(&stage, &mut state.motion, interval, &load),
         };

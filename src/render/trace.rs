@@ -117,7 +117,8 @@ pub struct Summary {
     pub outside: usize,
     /// Ticks with the proxy held at the border of the haptized range.
     pub held: usize,
-    /// Ticks with the proxy beside an absent grid point.
+    /// Ticks with the proxy beside an absent grid point. `absent` are the columns that a dataset lacks, in the same object.
+    #[serde(rename = "absent_ticks")]
     pub absent: usize,
     /// Ticks with the proxy beside an unconverged grid point, or for which contact was not solved in time.
     pub unconverged: usize,

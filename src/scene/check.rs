@@ -20,6 +20,12 @@ const TABLES: &str = "object object.sphere object.mesh object.tetrahedra object.
     scan.limits scan.simulated haptics haptics.friction haptics.four_channel haptics.hand graphics.stiffening motion \
     motion.press.* motion.scrape.* device";
 
+/// Keys that earlier versions read, and what to do without them.
+const REMOVED: [(&str, &str); 2] = [
+    ("haptics.contact_damping", "contact_damping is no more: leave it out, or give the coupling more coupling_damping"),
+    ("haptics.friction.damping", "friction has no damping of its own any more, the coupling's damps it: leave it out"),
+];
+
 /// The text that is being checked.
 pub(super) struct Checker<'a> {
     pub path: &'a Path,
@@ -42,6 +48,9 @@ impl Checker<'_> {
             let lists = |path: &str| list(root.get_ref(), path.split('.'));
             if let Some(place) = TABLES.split(' ').find_map(lists) {
                 return Err(self.error(place, "this is a list of values, and it must be a table: name each value"));
+            }
+            if let Some((path, remedy)) = REMOVED.into_iter().find(|(path, _)| self.has(path)) {
+                return Err(self.at(path, remedy));
             }
         }
         toml::from_str(self.text).map_err(|error| {

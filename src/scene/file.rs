@@ -8,7 +8,7 @@ use super::object::ObjectTable;
 use super::proxy::ProxyTable;
 use super::scan::ScanTable;
 use super::{
-    Algorithm, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
+    ContactLaw, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
     SceneError, shape,
 };
 use crate::names;
@@ -56,9 +56,9 @@ pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result
         return Err(checker.error(0..0, message));
     };
     let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, &mut table)?;
-    if let Some(effect) = haptics.at_contacts() {
-        let message = format!("{effect} needs the contact forces, which a real object does not tell: leave it out");
-        return Err(checker.at(&format!("haptics.{effect}"), message));
+    if haptics.friction.is_some() {
+        let message = "friction needs to know how contacts slip, which a real object does not tell: leave it out";
+        return Err(checker.at("haptics.friction", message));
     }
     Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }
@@ -78,7 +78,7 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     let mut haptics = take(&mut table.haptics);
     // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
     // energy.
-    let solved = table.contact.as_ref().is_some_and(|contact| contact.algorithm != Some(Algorithm::Paper));
+    let solved = table.contact.as_ref().is_some_and(|contact| contact.law != Some(ContactLaw::Paper));
     if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
         haptics.interpolation = Interpolation::Linear;
     }

@@ -164,6 +164,7 @@ impl Bake<'_> {
 pub(crate) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, ObjectError> {
     let mut model = Model::reaching(object, chain, scene.contact, &sample(scene))?;
     model.with_tangent = scene.uses_tangent();
+    model.with_slip = scene.haptics.friction.is_some();
     Ok(model)
 }
 

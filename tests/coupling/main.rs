@@ -7,4 +7,7 @@ mod block;
 mod channels;
 mod effects;
 mod passivity;
+#[path = "../../src/random.rs"]
+#[allow(dead_code, unreachable_pub)] // The library has more use for it.
+mod random;
 mod trace;

@@ -13,7 +13,7 @@ fn reference(body: &str, poisson: f64) -> f64 {
 }
 
 /// Mean displacement under the pressure `3/(pi a^2) (1 - r^2/a^2)^2` around `middle` along `-up`, over its force (m/N).
-fn compliance(object: &Object, middle: DVec3, up: DVec3) -> f64 {
+pub fn compliance(object: &Object, middle: DVec3, up: DVec3) -> f64 {
     let areas = own_areas(object);
     let mut forces = vec![DVec3::ZERO; object.rest.len()];
     for (node, area) in areas.iter().enumerate() {

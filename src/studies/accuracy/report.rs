@@ -1,6 +1,6 @@
 //! The files of a study: its table as CSV, and three work-precision diagrams, error up, cost across, both logarithmic.
 
-use super::{Accuracy, Row, Study, limits, offers};
+use super::{Accuracy, Row, Study};
 use crate::{
     csv::{Table, quoted},
     draw::{
@@ -10,10 +10,9 @@ use crate::{
         plot::{Entry, Mark},
     },
     report::{ReportError, write, write_both},
-    scene::{Algorithm, Interpolation},
+    scene::ContactLaw,
 };
 use std::{
-    fmt::{self, Write as _},
     io,
     path::{Path, PathBuf},
 };
@@ -53,7 +52,7 @@ fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
             Study::Spacing => "spacing",
             Study::Lookup => "look-up",
             Study::Tolerance => "tolerance",
-            Study::Algorithm => "algorithm",
+            Study::Law => "law",
             Study::Mesh => "mesh",
             Study::Links => "link nodes",
             Study::Skin => "skin",
@@ -64,60 +63,6 @@ fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
         table.fields([row.cost, row.rms, row.worst, accuracy.relative(row)])?.end()?;
     }
     Ok(text)
-}
-
-/// Describes which grid to take for which error, and what was measured, for people.
-///
-/// # Errors
-/// None in a `String`.
-pub fn describe(text: &mut String, accuracy: &Accuracy) -> fmt::Result {
-    let Accuracy { scene, configurations, in_contact, left_out, norm, torque, reference_error, .. } = accuracy;
-    writeln!(
-        text,
-        "{scene}: {configurations} random configurations, {in_contact} in contact, {left_out} left out; rms torque \
-         {torque:.4} {norm}, the reference errs by {reference_error:.1e}"
-    )?;
-    for name in Interpolation::ALL.map(Interpolation::name) {
-        if let Some(order) = accuracy.order(Study::Spacing, name) {
-            writeln!(text, "  order        {name:<9} error falls with spacing to the power {order:.2}")?;
-        }
-    }
-    for offer in offers(accuracy) {
-        let [target, unit] = [format!("{:.0}", 100.0 * offer.target), accuracy.unit.to_owned()];
-        writeln!(
-            text,
-            "  for {target:>4} %   take {} at {:.4} {unit}: {} points, {:.2} of the scene's bake",
-            offer.series, offer.spacing, offer.points, offer.cost
-        )?;
-    }
-    for study in [Study::Mesh, Study::Links, Study::Skin, Study::Stiffness] {
-        let Some(own) = accuracy.of(study).find(|row| row.value == 1.0) else { continue };
-        let falls = match accuracy.order(study, &own.series) {
-            Some(order) => format!("changes fall with the power {order:.2}"),
-            None => "changes do not fall".to_owned(),
-        };
-        writeln!(text, "  {:<12} the next step changes {:.2} %; {falls}", own.series, 100.0 * accuracy.relative(own))?;
-    }
-    let errs = |row: &Row| match 100.0 * accuracy.relative(row) {
-        error if error < 0.01 => format!("{} below 0.01 %", row.setting),
-        error => format!("{} {error:.2} %", row.setting),
-    };
-    let [looked, followed] = [false, true].map(|direct| {
-        let rows = accuracy.of(Study::Lookup).filter(|row| (row.series == Interpolation::Direct.name()) == direct);
-        rows.map(errs).collect::<Vec<_>>().join(", ")
-    });
-    writeln!(text, "  look-up      `linear` {:.0} ns; errors: {looked}", 1e9 * accuracy.look_up)?;
-    writeln!(
-        text,
-        "  direct       {:.0} us a solution in contact, by the law at rest; errors, solved {followed}",
-        1e6 * accuracy.solution
-    )?;
-    let limits = limits(accuracy);
-    let limits: Vec<String> = limits.iter().map(|limit| format!("{} {:.2} %", limit.of, 100.0 * limit.error)).collect();
-    if !limits.is_empty() {
-        writeln!(text, "  limited by   {}", limits.join(", "))?;
-    }
-    accuracy.notes.iter().try_for_each(|note| writeln!(text, "  note         {note}"))
 }
 
 /// A curve for each series of `study`, in the order of the rows.
@@ -179,7 +124,7 @@ fn time(accuracy: &Accuracy) -> Canvas {
     let mut sheet = Diagram::new(title, "left: a configuration solved offline; right: a tick of the loop", 1);
     let curves = |study| curves(accuracy, study, |row| (row.cost, row.rms));
     // The energy form at the scene's own tolerance is a dot of the curve of tolerances.
-    let rest = curves(Study::Algorithm).into_iter().filter(|curve| curve.name == Algorithm::Rest.name());
+    let rest = curves(Study::Law).into_iter().filter(|curve| curve.name == ContactLaw::Rest.name());
     let solved = curves(Study::Tolerance).into_iter().chain(rest).collect();
     let left = ("Time of a configuration, over the scene's own [1]".to_owned(), solved);
     let right = ("Time a tick, over linear's look-up [1]".to_owned(), curves(Study::Lookup));

@@ -1,0 +1,164 @@
+//! Coulomb friction of the proxy: one spring in C-space that yields, whatever the number of contacts (elastic-plastic,
+//! of the family of Dahl; the map that does not drift is that of Kikuuwe, Takesue, Sano, Mochiyama and Fujimoto 2006).
+//!
+//! With N and B of the contacts ([`crate::contact::Slip`]), the state is a deflection z (m) of `d` numbers, its spring
+//! k, and `rho = mu N / k` the deflection at which it yields. In a step with `dq = T v_hat`
+//!
+//! `z* = z + B dq`,  `z+ = z* min(1, rho / |z*|)`,  `tau = -k B (z + z+) / 2`.
+//!
+//! Sticking, the torque is that of a spring of k B B^T; sliding, its size `|B^-1 tau|` is mu N. mu is static for what
+//! stuck in the last step, which makes a soft hand drag the finger along in jerks, kinetic for what slid.
+//!
+//! *Energy.* The spring keeps `H = k |z|^2 / 2`. With `r = z* - z+` the work of friction on the proxy is
+//! `-k (z + z+)/2 . (z* - z) = -Delta H - k (z + z+)/2 . r`. Sliding, r is parallel to z+ and |z| at most |z+|, so that
+//! the last term takes energy; sticking, r is zero. So friction gives nothing beyond what its spring kept, for any T, N
+//! and B, however they change from step to step. Where rho falls below |z|, z is shortened first, which takes energy,
+//! too.
+//!
+//! *Implicit.* z+ depends on v_hat. `z+ = alpha z*` with alpha = 1 or, where the speed of the step before leads
+//! beyond rho, the ratio `rho / |z*|` at that speed: either makes the torque linear in v_hat, and one solve does. What
+//! comes out beyond rho is shortened afterwards. A step that turns against the predicted one, in which a ratio would
+//! give energy, is solved again with alpha = 1.
+
+use super::{
+    accounts::Extra,
+    npmi::{Load, MidpointInertia, Motion, Npmi, Step},
+};
+use crate::{JointMatrix, JointVector, contact::Slip, scene::FrictionSpec};
+
+/// The constants of friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Friction {
+    /// Kinetic and static mu (1).
+    kinetic: f64,
+    stiction: f64,
+    /// k (N/m).
+    stiffness: f64,
+}
+
+/// What friction hands from one step to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FrictionState {
+    /// z (m).
+    deflection: JointVector,
+    /// Whether it slid in the last step.
+    slid: bool,
+}
+
+/// A step of the proxy that is about to be made.
+pub(super) struct Pending<'a> {
+    /// Who makes it.
+    pub npmi: &'a Npmi,
+    /// Inertia in its middle.
+    pub stage: &'a MidpointInertia,
+    /// T (s).
+    pub interval: f64,
+    /// v_hat of the step before (rad/s or m/s).
+    pub velocity: JointVector,
+    /// Forces beside friction.
+    pub load: Load,
+}
+
+impl FrictionState {
+    /// Relaxed.
+    pub fn at_rest(joints: usize) -> Self {
+        Self { deflection: JointVector::zeros(joints), slid: false }
+    }
+}
+
+impl Friction {
+    /// The friction of a scene.
+    pub fn new(spec: &FrictionSpec) -> Self {
+        Self {
+            kinetic: spec.coefficient,
+            stiction: spec.static_coefficient.unwrap_or(spec.coefficient),
+            stiffness: spec.stiffness,
+        }
+    }
+
+    /// The `pending` step of the proxy, whose contacts slip as `slip` says. Books into `extra`. Never allocates.
+    pub fn step(
+        &self,
+        pending: &Pending<'_>,
+        slip: &Slip,
+        state: &mut FrictionState,
+        motion: &mut Motion,
+        extra: &mut Extra,
+    ) -> Step {
+        let Pending { npmi, stage, interval, velocity, load } = pending;
+        let reach = |coefficient| coefficient * slip.normal_force / self.stiffness;
+        let sticking = reach(if state.slid { self.kinetic } else { self.stiction });
+        let mut start = shortened(&state.deflection, sticking);
+        if slip.normal_force <= 0.0 {
+            *state = FrictionState { deflection: start, slid: false };
+            return npmi.advance(stage, motion, *interval, load);
+        }
+        let mut alpha = 1.0;
+        if moved(&start, slip, *interval, velocity).norm() > sticking {
+            start = shortened(&start, reach(self.kinetic));
+            alpha = (reach(self.kinetic) / moved(&start, slip, *interval, velocity).norm()).min(1.0);
+        }
+        let solve = |alpha: f64| {
+            let mut trial = *motion;
+            let step = npmi.advance(stage, &mut trial, *interval, &self.loaded(pending, slip, &start, alpha));
+            let end = moved(&start, slip, *interval, &step.velocity);
+            let mut kept = end;
+            kept.iter_mut().for_each(|z| *z *= alpha);
+            (trial, step, end, kept)
+        };
+        let mut solved = solve(alpha);
+        if alpha < 1.0 && start.dot(&solved.3) + solved.3.dot(&solved.3) < 0.0 {
+            alpha = 1.0;
+            solved = solve(alpha);
+        }
+        let (end_of_step, step, end, kept) = solved;
+        *motion = end_of_step;
+        let works = (0..start.len()).map(|a| (start[a] + kept[a]) * (end[a] - start[a]));
+        extra.friction_work = -0.5 * self.stiffness * works.sum::<f64>();
+        let slid = alpha < 1.0 || kept.norm() > sticking;
+        let deflection = shortened(&kept, if slid { reach(self.kinetic) } else { sticking });
+        extra.presliding = 0.5 * self.stiffness * deflection.dot(&deflection);
+        *state = FrictionState { deflection, slid };
+        step
+    }
+
+    /// The load of the step and friction, whose deflection goes from `start` z to `alpha` z*:
+    /// `tau = -k/2 B ((1 + alpha) z + alpha B T v_hat)`.
+    fn loaded(&self, pending: &Pending<'_>, slip: &Slip, start: &JointVector, alpha: f64) -> Load {
+        let mut load = pending.load;
+        let joints = start.len();
+        let damping = 0.5 * self.stiffness * pending.interval * alpha;
+        let force = 0.5 * self.stiffness * (1.0 + alpha);
+        for a in 0..joints {
+            load.torque[a] -= force * product(&slip.jacobian, a, start);
+            for b in 0..joints {
+                // B is symmetric.
+                let square: f64 = slip.jacobian[a].iter().zip(&slip.jacobian[b]).map(|(x, y)| x * y).sum();
+                load.damping[a][b] += damping * square;
+            }
+        }
+        load
+    }
+}
+
+/// z + B T v (m).
+fn moved(start: &JointVector, slip: &Slip, interval: f64, velocity: &JointVector) -> JointVector {
+    let mut end = *start;
+    end.iter_mut().enumerate().for_each(|(a, z)| *z += interval * product(&slip.jacobian, a, velocity));
+    end
+}
+
+/// Row `a` of `matrix` times `vector`.
+fn product(matrix: &JointMatrix, a: usize, vector: &JointVector) -> f64 {
+    vector.dot(&matrix[a])
+}
+
+/// `deflection`, no longer than `greatest`.
+fn shortened(deflection: &JointVector, greatest: f64) -> JointVector {
+    let mut shorter = *deflection;
+    let length = deflection.norm();
+    if length > greatest {
+        shorter.iter_mut().for_each(|z| *z *= greatest / length);
+    }
+    shorter
+}
