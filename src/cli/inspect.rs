@@ -11,7 +11,7 @@ use crate::{
     contact::{Model, NodeForce},
     dataset::{self, Dataset},
     field::TorqueField,
-    object::Object,
+    object::{LatticeError, Object},
     proxy::Chain,
     scene::{self, AxisSpec, GRID_STEP_SLACK, GridSpec, HapticsSpec, Interpolation, Scene},
     sweep::{Inspection, build_object},
@@ -98,6 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let inspected = Inspected {
         interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
         stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
+        lattice: object.lattice_error(&scene.object, &model.compliance),
         solved,
         warnings,
         body: Body { inclusions: info::inclusions(&scene.object), skin: object.skin },
@@ -116,6 +117,9 @@ struct Inspected {
     object_warnings: Vec<String>,
     #[serde(flatten)]
     body: Body,
+    /// Where a lattice fills the object: the error that it makes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lattice: Option<LatticeError>,
     /// Where there is a dataset: what it answers here.
     #[serde(skip_serializing_if = "Option::is_none")]
     interpolated: Option<Interpolated>,
@@ -250,6 +254,7 @@ impl Describe for Inspected {
             text.line(format_args!("  {number:<5} {position} {moved} {force}"));
         }
         self.body.describe(text);
+        self.lattice.iter().for_each(|error| text.row("lattice", error));
         if let Some(Interpolated { interpolation, torque, difference, .. }) = &self.interpolated {
             text.line(format_args!("the dataset, interpolated here ({}):", interpolation.name()));
             text.row("torque", efforts(torque));

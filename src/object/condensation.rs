@@ -1,10 +1,10 @@
 //! The condensed inverse R^T A^-1 R on the columns of a sparse R.
 //!
-//! With A = L L^T it is Y^T Y, where L Y = R: one forward substitution, and symmetric by construction. A column of Y is
-//! zero outside the paths that lead in the elimination tree from the rows of its entries to the root (Gilbert & Peierls
-//! 1988), which are a small part of L: those of a solid of n rows have O(n^(2/3)). Columns that are close in the order of
-//! elimination share most of their paths. So they are solved in blocks, dense over the supernodes that lie on any path of
-//! the block, and two blocks are multiplied over the supernodes that both have.
+//! With A = L L^T it is Y^T Y, where L Y = R: one forward substitution, and symmetric by construction. A column of Y
+//! is zero outside the paths that lead in the elimination tree from the rows of its entries to the root (Gilbert &
+//! Peierls 1988), which are a small part of L: those of a solid of n rows have O(n^(2/3)). Columns that are close in
+//! the order of elimination share most of their paths. So they are solved in blocks, dense over the supernodes that
+//! lie on any path of the block, and two blocks are multiplied over the supernodes that both have.
 
 use super::substitution::Supernodes;
 use faer::linalg::{matmul::matmul, triangular_solve::solve_lower_triangular_in_place};
@@ -26,8 +26,8 @@ struct Block<'c> {
     entries: Mat<f64>,
 }
 
-/// Returns R^T A^-1 R, row-major. `supernodes`, `values`: L. `columns`: the entries of each column of R, as row of L and
-/// value.
+/// Returns R^T A^-1 R, row-major. `supernodes`, `values`: L. `columns`: the entries of each column of R, as row of L
+/// and value.
 pub(super) fn condense(supernodes: &Supernodes, values: &[f64], columns: &[Vec<(usize, f64)>]) -> Vec<f64> {
     let mut numbers: Vec<usize> = (0..columns.len()).collect();
     numbers.sort_by_key(|&number| columns[number].first().map(|(row, _)| *row));

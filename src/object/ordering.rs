@@ -1,10 +1,10 @@
 //! In which order a factorisation takes the nodes: nested dissection by their positions.
 //!
-//! The nodes are halved near the median along the longest side of their box; the nodes of one half that have a neighbour
-//! in the other separate the two and come last, after both halves, each ordered in the same way (George, Nested
-//! dissection of a regular finite element mesh, 1973). Eliminating a node then fills in only what its own part and the
-//! separators around it hold: O(N log N) entries of the factor on a surface, O(N^(4/3)) in a solid. Meshes of points in
-//! space dissect better by geometry than by minimum degree on the graph, and faster.
+//! The nodes are halved near the median along the longest side of their box; the nodes of one half that have a
+//! neighbour in the other separate the two and come last, after both halves, each ordered in the same way (George,
+//! Nested dissection of a regular finite element mesh, 1973). Eliminating a node then fills in only what its own part
+//! and the separators around it hold: O(N log N) entries of the factor on a surface, O(N^(4/3)) in a solid. Meshes of
+//! points in space dissect better by geometry than by minimum degree on the graph, and faster.
 //!
 //! Nodes of a lattice lie in layers. A cut between two layers bounds the cubes on one of its sides: there one layer
 //! separates the halves, on the other two, which makes twice the entries. So the smaller of both separators is taken.

@@ -5,7 +5,7 @@ use crate::{
     JointVector,
     contact::Model,
     dataset::Dataset,
-    object::{Compliance, Object, ObjectError},
+    object::{Compliance, LatticeError, Object, ObjectError},
     proxy::Chain,
     scene::{AxisSpec, Scene},
 };
@@ -153,6 +153,8 @@ impl Bake<'_> {
             }
         }
         sweep.aim_at(aim);
+        let error = object.lattice_error(&scene.object, &model.compliance);
+        sweep.warnings.extend(error.filter(LatticeError::is_large).map(|error| error.to_string()));
         let run = Run { chunk: chosen.chunk(), stop, progress };
         work(&mut sweep, &mut chosen, run)
     }
