@@ -91,7 +91,8 @@ macro_rules! element {
         $(impl Element for $number { const DTYPE: Dtype = Dtype::$dtype; })*
     };
 }
-element!(f64 => F64, u64 => U64, f32 => F32, u32 => U32, u8 => U8);
+// The upper half of an f32 is a bfloat16.
+element!(f64 => F64, u64 => U64, f32 => F32, u32 => U32, u16 => BF16, u8 => U8);
 
 /// A tensor about to be written.
 pub(crate) struct Tensor<C> {

@@ -21,6 +21,9 @@ fn levels(joints: usize) -> u32 {
 /// Rounding of sums of f32 numbers of order one, relative (1): a few hundred of them.
 const ROUNDING: f64 = 1e-5;
 
+/// Greatest of the numbers that say how contacts slip, more or less (1).
+const MOST_SLIP: f64 = 3.0;
+
 /// Distance from a border at which both sides are looked at, in steps of the base.
 const BESIDE: f64 = 1e-9;
 
@@ -191,13 +194,13 @@ fn slips_that_are_affine_are_met_everywhere_whatever_nodes_there_are() {
             let q: Vec<f64> = (0..joints).map(|a| -0.2 + (1.0 + 0.99 * random.next()) * step(a)).collect();
             let found = store.slip(&q);
             for (found, exact) in found.iter().zip(slip(&q)) {
-                assert!((found - exact).abs() < ROUNDING, "{joints}: {found} for {exact}");
+                // They are kept to eight bits, and mixed with weights that sum to one.
+                assert!((found - exact).abs() < MOST_SLIP / 512.0 + ROUNDING, "{joints}: {found} for {exact}");
             }
             assert!(found[width(joints)..].iter().all(|rest| *rest == 0.0));
         }
-        // A curved one is not met.
-        let curved: Vec<f64> = slip(&vec![0.05; joints]).iter().map(|x| x * x).collect();
-        assert!((store.slip(&vec![0.05; joints])[0] - curved[0]).abs() > 1e-3);
+        // Another one is not met.
+        assert!((store.slip(&vec![0.05; joints])[0] - slip(&vec![0.1; joints])[0]).abs() > MOST_SLIP / 256.0);
     }
 }
 

@@ -10,7 +10,8 @@ pub struct Nodes {
     pub present: u64,
     /// w, its gradient and mixed derivatives at each (sqrt(J), by rad or m); see [`super::record`].
     pub records: Vec<f32>,
-    /// Slip of the contacts at each ([`super::record::slip_of`]); empty where none is asked for.
+    /// Slip of the contacts at each ([`super::record::slip_of`]), rounded to bfloat16: friction is known to some percent.
+    /// Empty where none is asked for.
     pub slips: Vec<f32>,
     /// Smallest signed distance between proxy and object at rest (m).
     pub gap: Vec<f32>,
@@ -23,7 +24,7 @@ impl Nodes {
     pub fn push(&mut self, place: usize, record: &[f32], slip: &[f32], gap: f32, status: Status) {
         self.present |= 1 << place;
         self.records.extend_from_slice(record);
-        self.slips.extend_from_slice(slip);
+        self.slips.extend(slip.iter().map(|number| widened(narrowed(*number))));
         self.gap.push(gap);
         self.status.push(status as u8);
     }
@@ -50,6 +51,16 @@ impl Nodes {
             && self.records.iter().chain(&self.slips).chain(&self.gap).all(|number| number.is_finite())
             && self.status.iter().all(|&number| Status::from_number(number).is_some())
     }
+}
+
+/// The bfloat16 nearest to `number`, of halves the one away from zero; its bits.
+pub(super) fn narrowed(number: f32) -> u16 {
+    (number.to_bits().saturating_add(1 << 15) >> 16) as u16
+}
+
+/// The number whose bits are a bfloat16's.
+pub(super) fn widened(bits: u16) -> f32 {
+    f32::from_bits(u32::from(bits) << 16)
 }
 
 /// A published block.

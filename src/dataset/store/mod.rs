@@ -255,10 +255,11 @@ impl Store {
     /// or without (bytes).
     #[must_use]
     pub fn most_bytes(joints: usize, nodes: usize, with_slips: bool) -> [usize; 2] {
-        let record = size_of::<f32>() * width(joints) * (1 + usize::from(with_slips));
+        let record = size_of::<f32>() * width(joints);
+        let slip = record * usize::from(with_slips);
         // Numbers of the node and of the interpolation, its gap and status; in the file key and places of the block.
-        let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * record + size_of::<f32>() + 1;
-        let file = 2 * size_of::<u64>() + record + size_of::<f32>() + 1;
+        let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * (record + slip) + size_of::<f32>() + 1;
+        let file = 2 * size_of::<u64>() + record + slip / 2 + size_of::<f32>() + 1;
         [memory, file].map(|each| nodes.saturating_mul(each))
     }
 
