@@ -1,10 +1,10 @@
 //! How the surface follows the nodes that K moves.
 //!
 //! A node of the surface stands for its own area: a third of each triangle around it. Its displacement is the mean of
-//! the solid's over that area, `u_i = sum_a N_ia u_a`, and a force on it is spread over the same area. Displacements and
-//! forces use the same N, so the compliance `C = N K^-1 N^T` is symmetric. Forces at points instead would make a node on
-//! a corner of the lattice four times as soft as its neighbours. On springs and skins the nodes of K are those of the
-//! surface, and N is the identity.
+//! the solid's over that area, `u_i = sum_a N_ia u_a`, and a force on it is spread over the same area. Displacements
+//! and forces use the same N, so the compliance `C = N K^-1 N^T` is symmetric. Forces at points instead would make a
+//! node on a corner of the lattice four times as soft as its neighbours. On springs and skins the nodes of K are those
+//! of the surface, and N is the identity.
 
 use glam::DVec3;
 use std::collections::BTreeMap;

@@ -28,8 +28,8 @@ use glam::DVec3;
 use std::sync::Arc;
 
 /// Smallest accepted reciprocal condition number of K with its diagonal scaled to one (1): what is soft for its place
-/// alone, such as a cube that the surface hardly enters, costs no digits (van der Sluis 1969). K (C f) equals f to about
-/// machine precision over this number, and the equilibria that are stored promise 1e-6.
+/// alone, such as a cube that the surface hardly enters, costs no digits (van der Sluis 1969). K (C f) equals f to
+/// about machine precision over this number, and the equilibria that are stored promise 1e-6.
 const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
 
 /// Shift, relative to the diagonal of K, under which the free motion of a singular K is sought (1): the square root of

@@ -1,8 +1,8 @@
 //! What holds the object: springs Kg, per node, per area or per volume, or a clamp.
 //!
-//! Springs per node depend on the mesh: a finer one has more of them. Those per area and per volume belong to the body.
-//! A clamp is springs per area so stiff that they hardly give way. All act on the displacement of the surface, or of the
-//! solid, as the nodes of K move it.
+//! Springs per node depend on the mesh: a finer one has more of them. Those per area and per volume belong to the
+//! body. A clamp is springs per area so stiff that they hardly give way. All act on the displacement of the surface,
+//! or of the solid, as the nodes of K move it.
 
 use super::attachment::{Attachment, SurfacePoint};
 use super::solid::Elements;
@@ -12,7 +12,8 @@ use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
 /// Stiffness of a clamp per area, in Young's moduli over the mean edge of the surface (1). Under the stress that
-/// strains the solid by one percent the clamped surface moves by a millionth of an edge. Larger: K is worse conditioned.
+/// strains the solid by one percent the clamped surface moves by a millionth of an edge. Larger: K is worse
+/// conditioned.
 const CLAMP: f64 = 1e4;
 
 /// What the ground acts on.

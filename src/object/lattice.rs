@@ -17,14 +17,15 @@ use crate::scene::GRID_LINE;
 use glam::{DVec2, DVec3, IVec3};
 use robust::{Coord, orient2d};
 
-/// Factor on the material of a cut cube outside the surface (1). Smaller: K is worse conditioned, by its inverse. Larger:
-/// the body is stiffer; at this one compliance is less by some 0.1 %.
+/// Factor on the material of a cut cube outside the surface (1). Smaller: K is worse conditioned, by its inverse.
+/// Larger: the body is stiffer; at this one compliance is less by some 0.1 %.
 const OUTSIDE: f64 = 1e-4;
 
 /// Lines through a cube along each of two axes: three points of Gauss in each half.
 const LINES: usize = 6;
 
-/// Ends of a stretch this near to a cube's face lie on it, in cubes (1): far above rounding, and far below what matters.
+/// Ends of a stretch this near to a cube's face lie on it, in cubes (1): far above rounding, and far below what
+/// matters.
 const FACE: f64 = 1e-9;
 
 /// Most cubes over the box around a surface: their numbers alone take some MB.

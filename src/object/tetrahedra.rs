@@ -1,7 +1,7 @@
 //! Tetrahedra of ten nodes from a mesh of such or of four nodes.
 //!
-//! A tetrahedron of four nodes is straight: nodes in the middles of its edges raise it to the second order. Ten nodes of
-//! a file may lie on a curved surface; place and displacement then have the same shape functions (isoparametric).
+//! A tetrahedron of four nodes is straight: nodes in the middles of its edges raise it to the second order. Ten nodes
+//! of a file may lie on a curved surface; place and displacement then have the same shape functions (isoparametric).
 
 use super::attachment::SurfacePoint;
 use super::element::{GAUSS, Lame, Quadrature, TETRAHEDRON_EDGES, TETRAHEDRON_NODES, tetrahedron as shape_functions};
@@ -127,7 +127,8 @@ fn barycentric(node: usize) -> DVec4 {
     }
 }
 
-/// Barycentric coordinates and weights of points in a tetrahedron: for a curved one 27, those of a cube collapsed to it.
+/// Barycentric coordinates and weights of points in a tetrahedron: for a curved one 27, those of a cube collapsed to
+/// it.
 fn points(is_curved: bool) -> Vec<(DVec4, f64)> {
     if !is_curved {
         let [one, other] = FOUR_POINTS;

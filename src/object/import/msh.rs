@@ -2,10 +2,10 @@
 //!
 //! Read are `$MeshFormat`, `$Nodes` (or `$ParametricNodes`), the physical volumes in `$Entities` and
 //! `$PartitionedEntities` (4.1) and the elements of type 4 or 11 (tetrahedra of four or of ten nodes) in `$Elements`;
-//! points, lines and triangles, which Gmsh writes for boundaries, and all other sections are read past, and other volume elements are
-//! refused. A tetrahedron that is written once for each of its physical volumes counts once. The surface is what it
-//! always is: the faces that belong to one tetrahedron only. Every error names the line. Nothing is reserved for what a
-//! file announces before it is there.
+//! points, lines and triangles, which Gmsh writes for boundaries, and all other sections are read past, and other
+//! volume elements are refused. A tetrahedron that is written once for each of its physical volumes counts once. The
+//! surface is what it always is: the faces that belong to one tetrahedron only. Every error names the line. Nothing is
+//! reserved for what a file announces before it is there.
 
 use super::text;
 use glam::DVec3;
