@@ -15,7 +15,7 @@ use haptize::{
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver, KernelTime},
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, GraphicsEffects, Scene, Shape},
+    scene::{ContactLaw, GraphicsEffects, Scene, Shape},
     sweep::{Backend, BackendChoice, Bake, CpuBackend, build_object, sample},
 };
 use std::{
@@ -93,7 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The scene of a file, with contact at rest.
 fn load(name: &str) -> Result<Scene, Box<dyn Error>> {
     let mut scene = Scene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(name))?;
-    scene.contact.algorithm = Algorithm::Rest;
+    scene.contact.law = ContactLaw::Rest;
     Ok(scene)
 }
 

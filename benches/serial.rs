@@ -10,7 +10,7 @@ use haptize::{
     contact::{Equilibrium, Model, Work},
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, AxisSpec, Scene},
+    scene::{AxisSpec, ContactLaw, Scene},
     sweep::{Backend, CpuBackend, Run, Sweep},
 };
 use rustix::time::{ClockId, clock_gettime};
@@ -33,8 +33,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         "{:<24} {:>10} {:>12} {:>20} {:>18}",
         "", "shared out", "beside that", "alone or awaited", "and behind that"
     );
-    for algorithm in [Algorithm::Energy, Algorithm::Paper, Algorithm::Rest] {
-        scene.contact.algorithm = algorithm;
+    for law in [ContactLaw::Following, ContactLaw::Paper, ContactLaw::Rest] {
+        scene.contact.law = law;
         for work in [Extent::Solved, Extent::Lowest, Extent::Measured] {
             let mut least = bake(&scene, work)?;
             for _ in 1..TURNS {
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             // What is done beside the solving ends when both have.
             let alone = alone + (beside - shared / CORES).max(0.0);
             let share = |alone: f64| 100.0 * alone / (alone + shared / CORES);
-            let name = format!("{algorithm:?}, {work:?}").to_lowercase();
+            let name = format!("{law:?}, {work:?}").to_lowercase();
             println!(
                 "{name:<24} {shared:>10.2} {beside:>12.3} {alone:>11.4} {:>6.1} % {behind:>9.4} {:>6.1} %",
                 share(alone),

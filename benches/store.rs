@@ -82,7 +82,7 @@ fn dense(grid: &Grid, levels: u32) -> Store {
                 let mut record = vec![0.0_f32; width(joints)];
                 record[0] = (q.iter().sum::<f64>() * normal) as f32;
                 (0..joints).for_each(|a| record[slope(a)] = normal as f32);
-                nodes.push(place, &record, 0.0, Status::Contact);
+                nodes.push(place, &record, &[], 0.0, Status::Contact);
             }
             store.publish(level, block, nodes).unwrap();
         }

@@ -15,7 +15,7 @@ use haptize::{
     object::Object,
     proxy::Chain,
     report::write_both,
-    scene::{Algorithm, JointKind, Scene, Shape},
+    scene::{ContactLaw, JointKind, Scene, Shape},
     sweep::{Backend, CpuBackend, FreeSpace},
 };
 use serde_json::json;
@@ -44,9 +44,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::load(root.join("tests/scenes/sphere.toml"))?;
     let cores = std::thread::available_parallelism()?.get();
     println!("tests/scenes/sphere.toml on {cores} cores\n");
-    scene.contact.algorithm = Algorithm::Paper;
+    scene.contact.law = ContactLaw::Paper;
     let paper = fastest(&scene)?;
-    scene.contact.algorithm = Algorithm::Energy;
+    scene.contact.law = ContactLaw::Following;
     let energy = fastest(&scene)?;
     println!("{:<34} {:>16} {:>9} {:>10}", "", "configurations/s", "contact", "converged");
     for (name, run) in [("haptize, the paper's iteration", &paper), ("haptize, energy", &energy)] {

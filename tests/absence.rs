@@ -14,7 +14,7 @@ use haptize::{
     object::{Factor, Object},
     proxy::Chain,
     render::{coupling::Coupling, npmi, session, setup::Setup, trace::Trace},
-    scene::{Algorithm, ContactSpec, EFFECTS, Effect, Rendering, Scene},
+    scene::{ContactLaw, ContactSpec, EFFECTS, Effect, Rendering, Scene},
     sweep,
 };
 use std::{
@@ -24,7 +24,10 @@ use std::{
 
 /// The sphere under the arm of three joints, every third line of its grid.
 fn sphere() -> Scene {
-    let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml")).unwrap();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/scenes/sphere.toml");
+    // Relaxation asks for a potential.
+    let text = std::fs::read_to_string(path).unwrap().replace("\"linear\"", "\"potential\"");
+    let mut scene = Scene::parse(&text, path).unwrap();
     for axis in &mut scene.grid.axes {
         (axis.count, axis.step) = (axis.count / 3, 3.0 * axis.step);
     }
@@ -120,8 +123,8 @@ fn a_dataset_holds_what_its_effects_need_and_all_else_is_the_same_bits() {
     for effect in EFFECTS {
         let named = with(false, &[effect]);
         let mut fields = if effect.is_drawn() { graphics.fields() } else { plain.fields() };
-        if effect.is_at_contacts() {
-            fields.extend(["touch_forces", "touch_nodes", "touch_offsets"].map(str::to_owned));
+        if effect.key == "friction" {
+            fields.extend(["normal_force", "slip_jacobian"].map(str::to_owned));
         }
         assert_eq!(named.fields(), fields, "{}", effect.key);
         assert!(named.columns() == plain.columns(), "{}", effect.key);
@@ -313,7 +316,7 @@ fn on_the_gpu_each_effect_makes_its_own_buffers_and_pipelines_and_no_others() {
     let [plain, felt] = [&[][..], &EFFECTS[..5]].map(|effects| {
         let scene = sphere().with_effects(false, effects).unwrap();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
-        let model = Model::new(&object, &chain, ContactSpec { algorithm: Algorithm::Rest, ..scene.contact });
+        let model = Model::new(&object, &chain, ContactSpec { law: ContactLaw::Rest, ..scene.contact });
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let (solver, found) = made(&context, || GpuSolver::new(Arc::clone(&context), &model).unwrap());
         drop(solver);
@@ -331,13 +334,14 @@ fn an_effect_that_cannot_act_is_an_error_that_says_so() {
     // A virtual one whose dataset was gridized from measurements, or has lost its contact forces.
     let without_forces = |effect: Effect| {
         let mut baked = with(true, &[effect]);
-        (baked.data.contacts, baked.data.touches) = (None, None);
+        (baked.data.contacts, baked.data.slip) = (None, None);
         Setup::new(&baked.data).err().map(|error| error.to_string())
     };
     for effect in EFFECTS {
         let told = without_forces(effect);
-        match (effect.needs_forces(), &told) {
-            (true, Some(told)) => assert!(told.contains(effect.key) && told.contains("contact forces"), "{told}"),
+        let lacks = if effect.is_drawn() { "contact forces" } else { "how contacts slip" };
+        match (effect.is_stored(), &told) {
+            (true, Some(told)) => assert!(told.contains(effect.key) && told.contains(lacks), "{told}"),
             (needs, _) => assert!(!needs && told.is_none(), "{}: {told:?}", effect.key),
         }
         if effect.is_drawn() {

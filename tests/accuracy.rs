@@ -34,7 +34,7 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
     let by_tolerance: Vec<f64> = found.of(Study::Tolerance).map(|row| row.rms).collect();
     assert!(by_tolerance[0] > 10.0 * by_tolerance[by_tolerance.len() - 1], "{by_tolerance:?}");
     // Of both laws, the reference's errs as its tolerance does; that of the surface at rest is another one.
-    let by_law: Vec<f64> = found.of(Study::Algorithm).map(|row| found.relative(row)).collect();
+    let by_law: Vec<f64> = found.of(Study::Law).map(|row| found.relative(row)).collect();
     assert!(by_law.len() == 2 && by_law[0] < 1e-6 && (1e-3..1.0).contains(&by_law[1]), "{by_law:?}");
     // Mesh, contact nodes and contact stiffness in four steps, each row against the next; stiffer contact changes ever
     // less.
@@ -70,17 +70,16 @@ fn errors_fall_with_spacing_and_tolerance_and_repeat_exactly() {
 
 /// By the law at rest a live solution is exact; by another it errs by the difference of the two.
 #[test]
-fn direct_errs_by_the_difference_of_the_laws() {
+fn live_contact_errs_by_the_difference_of_the_laws() {
     let text = std::fs::read_to_string("tests/scenes/small.toml").unwrap();
     let extent = Extent { configurations: 200, points: 100, rounds: 1 };
-    let error = |geometry: &str| {
-        let law = format!("[contact]\ngeometry = \"{geometry}\"\n");
+    let error = |name: &str| {
+        let law = format!("[contact]\nlaw = \"{name}\"\n");
         let scene = Scene::parse(&text.replace("[contact]\n", &law), "small.toml").unwrap();
         let found = accuracy::measure(&scene, extent, &mut |_| ()).unwrap();
-        let direct: Vec<f64> =
-            found.of(Study::Lookup).filter(|row| row.series == "direct").map(|row| row.rms).collect();
-        assert_eq!(direct.len(), 1);
-        direct[0]
+        let live: Vec<f64> = found.of(Study::Lookup).filter(|row| row.series == "live").map(|row| row.rms).collect();
+        assert_eq!(live.len(), 1);
+        live[0]
     };
     let (exact, following) = (error("rest"), error("following"));
     assert!(exact < 1e-6 * following && following > 0.0, "{exact} {following}");

@@ -4,7 +4,7 @@
 
 use haptize::{
     contact::Status,
-    dataset::{Axis, Contacts, Dataset, Error, Format, Grid, Provenance, Solid, Surface},
+    dataset::{Axis, Contacts, Dataset, Error, Format, Grid, Provenance, SlipColumns, Solid, Surface},
 };
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -59,10 +59,9 @@ fn sample() -> Dataset {
             nodes: vec![0, 3, 1, 1, 2].into(),
             forces: (0..15).map(|k| k as f32 * 0.1 - 0.3).collect::<Vec<_>>().into(),
         }),
-        touches: Some(Contacts {
-            offsets: vec![0, 0, 1, 3, 3, 3, 3].into(),
-            nodes: vec![4000, 0, 7].into(),
-            forces: (0..9).map(|k| 0.2 - k as f32 * 0.1).collect::<Vec<_>>().into(),
+        slip: Some(SlipColumns {
+            normal_force: vec![0.0, 1.5, 1e-3, 20.0, 0.25, 0.0].into(),
+            jacobian: (0..18).map(|k| 0.2 - k as f32 * 0.1).collect::<Vec<_>>().into(),
         }),
         surface: Some(Surface {
             nodes: (0..12).map(|k| f64::from(k) / 7.0).collect::<Vec<_>>().into(),
@@ -100,7 +99,7 @@ fn bare() -> Dataset {
         residual: None,
         iterations: None,
         contacts: None,
-        touches: None,
+        slip: None,
         surface: None,
         ..sample()
     }
@@ -113,7 +112,7 @@ fn bits<T: bytemuck::Pod>(column: &[T]) -> Vec<u8> {
 /// Everything in a dataset, bit for bit.
 fn contents(dataset: &Dataset) -> Vec<(&'static str, Option<Vec<u8>>)> {
     let contacts = dataset.contacts.as_ref();
-    let touches = dataset.touches.as_ref();
+    let slip = dataset.slip.as_ref();
     let surface = dataset.surface.as_ref();
     let solid = surface.and_then(|surface| surface.solid.as_ref());
     vec![
@@ -129,9 +128,8 @@ fn contents(dataset: &Dataset) -> Vec<(&'static str, Option<Vec<u8>>)> {
         ("offsets", contacts.map(|c| bits(&c.offsets))),
         ("nodes", contacts.map(|c| bits(&c.nodes))),
         ("forces", contacts.map(|c| bits(&c.forces))),
-        ("touch offsets", touches.map(|c| bits(&c.offsets))),
-        ("touch nodes", touches.map(|c| bits(&c.nodes))),
-        ("touch forces", touches.map(|c| bits(&c.forces))),
+        ("normal force", slip.map(|slip| bits(&slip.normal_force))),
+        ("slip Jacobian", slip.map(|slip| bits(&slip.jacobian))),
         ("surface nodes", surface.map(|s| bits(&s.nodes))),
         ("triangles", surface.map(|s| bits(&s.triangles))),
         ("inner nodes", solid.map(|s| bits(&s.inner_nodes))),
@@ -348,10 +346,9 @@ fn hostile_numbers() -> Vec<Hostile> {
         ("tetrahedra without inner nodes", Box::new(|header, _| rename(header, "inner_nodes", "i")), "inner_nodes"),
         ("a contact on a node that is not", write("contact_nodes", 1, u32::MAX.to_le_bytes().into()), "contact_nodes"),
         ("a node twice in a row", write("contact_nodes", 1, 0_u32.to_le_bytes().into()), "do not ascend"),
-        ("a touch without end", write("touch_offsets", 6, 4_u64.to_le_bytes().into()), "touch_offsets do not run"),
-        ("a proxy node twice in a row", write("touch_nodes", 2, 0_u32.to_le_bytes().into()), "touch_nodes of point 2"),
-        ("an infinite touch", write("touch_forces", 8, f32::INFINITY.to_le_bytes().into()), "touch_forces"),
-        ("touches without nodes", Box::new(|header, _| rename(header, "touch_nodes", "t")), "touch_nodes"),
+        ("an infinite normal force", write("normal_force", 2, f32::INFINITY.to_le_bytes().into()), "normal_force"),
+        ("a slip that is no number", write("slip_jacobian", 8, f32::NAN.to_le_bytes().into()), "slip_jacobian"),
+        ("normal forces without slips", Box::new(|header, _| rename(header, "slip_jacobian", "s")), "slip_jacobian"),
         ("a row beyond the end", write("contact_offsets", 3, u64::MAX.to_le_bytes().into()), "descend"),
         ("a descending row", write("contact_offsets", 2, 4_u64.to_le_bytes().into()), "descend"),
         ("a last row too short", write("contact_offsets", 6, 4_u64.to_le_bytes().into()), "do not run"),
@@ -384,6 +381,11 @@ fn hostile_headers() -> Vec<Hostile> {
             "extra does not belong",
         ),
         ("a foreign name", Box::new(|header, _| rename(header, "energy", "zeal")), "zeal does not belong"),
+        (
+            "what friction was felt by before",
+            Box::new(|header, _| rename(header, "iterations", "touch_offsets")),
+            "leave contact_damping out of its scene and bake it again",
+        ),
         ("no torque", Box::new(|header, _| rename(header, "torque", "tau")), "torque is missing"),
         ("contacts without forces", Box::new(|header, _| rename(header, "contact_forces", "f")), "contact_forces"),
         ("another type", Box::new(|header, _| header["energy"]["dtype"] = "I64".into()), "energy has type I64"),
@@ -563,8 +565,8 @@ fn the_text_files_hold_the_same_numbers() {
     let mut lines = text.lines();
     assert_eq!(
         lines.next().unwrap(),
-        "base [rad],\"\"\"s\"\", lide [m]\",torque base [N m],\"force \"\"s\"\", lide [N]\",energy [J],gap [m],\
-         status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside),residual [1],iterations,contacts"
+        "base [rad],\"\"\"s\"\", lide [m]\",torque base [N m],\"force \"\"s\"\", lide [N]\",energy [J],normal_force [N],\
+         gap [m],status (0 free; 1 contact; 2 unconverged; 3 overflow; 4 outside),residual [1],iterations,contacts"
     );
     let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect();
     assert_eq!(rows.len(), 6);
@@ -573,11 +575,12 @@ fn the_text_files_hold_the_same_numbers() {
         assert_eq!(row[..2], dataset.grid.configuration(point)[..]);
         assert_eq!(row[2..4], *dataset.torque(point));
         assert_eq!(row[4], dataset.energy.as_ref().unwrap()[point]);
-        assert_eq!(row[5] as f32, dataset.gap.as_ref().unwrap()[point]);
-        assert_eq!(row[6], f64::from(dataset.status[point]));
-        assert_eq!(row[7] as f32, dataset.residual.as_ref().unwrap()[point]);
-        assert_eq!(row[8], f64::from(dataset.iterations.as_ref().unwrap()[point]));
-        assert_eq!(row[9], contacts[point]);
+        assert_eq!(row[5] as f32, dataset.slip.as_ref().unwrap().normal_force[point]);
+        assert_eq!(row[6] as f32, dataset.gap.as_ref().unwrap()[point]);
+        assert_eq!(row[7], f64::from(dataset.status[point]));
+        assert_eq!(row[8] as f32, dataset.residual.as_ref().unwrap()[point]);
+        assert_eq!(row[9], f64::from(dataset.iterations.as_ref().unwrap()[point]));
+        assert_eq!(row[10], contacts[point]);
     }
     let text = std::fs::read_to_string(&other).unwrap();
     assert_eq!(text.lines().count(), 6);

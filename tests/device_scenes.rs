@@ -12,7 +12,7 @@ use haptize::{
     device::{LinearMap, Motion, Recorded},
     proxy::Chain,
     render::{flags::Flags, session, setup::Setup},
-    scene::{Algorithm, Rendering, Scene, Waypoint},
+    scene::{ContactLaw, Rendering, Scene, Waypoint},
     sweep::{BackendChoice, Bake},
 };
 use std::{path::Path, process::Command, sync::atomic::AtomicBool};
@@ -228,7 +228,7 @@ fn scenes_are_felt_at_once_and_replayed_as_they_were_felt() {
         assert!(whole && felt["contact_share"].as_f64().unwrap() > 0.05, "{told} {felt:#}");
         assert!(felt["max_relative_account_residual"].as_f64().unwrap() < 1e-9, "{felt:#}");
         assert_eq!(felt["unconverged"], 0, "{felt:#}");
-        let follows = Scene::load(&scene).unwrap().contact.algorithm != Algorithm::Rest;
+        let follows = Scene::load(&scene).unwrap().contact.law != ContactLaw::Rest;
         assert_eq!(told.contains("law that follows the deformation"), follows, "{told}");
         let (whole, told, again) = run(&["play", &scene, "--replay", "session.csv", "--json"]);
         assert!(whole && again["replayed"] == true, "{told} {again:#}");

@@ -26,8 +26,8 @@ use haptize::{
         setup::{Setup, labels},
     },
     scene::{
-        FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticsSpec, Interpolation, ProxyInertia, Scene,
-        Waypoint,
+        FourChannelSpec, FrictionSpec, GraphicsEffects, GraphicsSpec, HapticsSpec, Interpolation, ProxyInertia,
+        RelaxationSpec, Scene, Waypoint,
     },
     sweep::baked,
 };
@@ -343,15 +343,18 @@ fn the_first_deadline_comes_after_the_system_has_granted_what_it_grants() {
     assert!(lateness.count == 1 && lateness.max < 150e3, "{lateness:?}");
 }
 
-/// Friction and contact damping as the tests feel them.
+/// Friction as the tests feel it.
 fn rubbing(gains: &mut HapticsSpec) {
-    let (static_coefficient, stiffness) = (Some(0.4), 500.0);
-    gains.friction = Some(FrictionSpec { coefficient: 0.3, static_coefficient, stiffness, damping: 1.0 });
-    gains.contact_damping = Some(5.0);
+    gains.friction = Some(FrictionSpec { coefficient: 0.3, static_coefficient: Some(0.4), stiffness: 500.0 });
 }
 
-/// The sphere over every third line of its grid, a little less than the joints can reach, with what friction and
-/// contact damping need.
+/// Memory as the tests feel it, forgetting as the arm slides.
+fn relaxing() -> Option<RelaxationSpec> {
+    Some(RelaxationSpec { terms: vec![[0.5, 0.05], [0.2, 0.5]], dent: Some(0.01) })
+}
+
+/// The sphere over every third line of its grid, a little less than the joints can reach, with what friction
+/// needs.
 fn sphere() -> Dataset {
     let mut scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
     rubbing(&mut scene.haptics);
@@ -370,18 +373,13 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     rubbing(&mut all);
     all.four_channel = Some(FourChannelSpec { channels: [0.5, 1.0, 1.0, 0.5], filter: 0.005 });
     all.passivity_control = true;
-    let HapticsSpec { friction, contact_damping, four_channel, .. } = all;
-    let none = HapticsSpec {
-        friction: None,
-        contact_damping: None,
-        four_channel: None,
-        passivity_control: false,
-        ..all.clone()
-    };
+    let HapticsSpec { friction, four_channel, .. } = all;
+    let none = HapticsSpec { friction: None, four_channel: None, passivity_control: false, ..all.clone() };
     let effects = [
         none.clone(),
         HapticsSpec { friction, ..none.clone() },
-        HapticsSpec { contact_damping, ..none.clone() },
+        HapticsSpec { relaxation: relaxing(), ..none.clone() },
+        HapticsSpec { friction, relaxation: relaxing(), ..none.clone() },
         HapticsSpec { four_channel, ..none.clone() },
         HapticsSpec { passivity_control: true, ..none },
         all,
@@ -390,7 +388,8 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
     for interpolation in Interpolation::ALL {
         for inertia in [ProxyInertia::Constant, ProxyInertia::Configuration] {
             for effects in &effects {
-                let gains = HapticsSpec { interpolation, proxy_inertia: inertia, ..effects.clone() };
+                let relaxation = effects.relaxation.clone().filter(|_| interpolation.is_potential());
+                let gains = HapticsSpec { interpolation, proxy_inertia: inertia, relaxation, ..effects.clone() };
                 let (haptics, _) = setup.retuned(&data, &gains).unwrap();
                 let mut state = haptics.start(&setup.scene.motion.press[0].q).unwrap();
                 let mut before = setup.scene.motion.press[0].q;

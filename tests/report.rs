@@ -136,7 +136,7 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         iterations: None,
         tangent: None,
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
-        touches: None,
+        slip: None,
         surface: Some(Surface::of(object)),
         refinement: None,
         scene: String::new(),

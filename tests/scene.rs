@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use haptize::scene::{
-    Algorithm, ContactSurface, Diagnostic, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind,
+    ContactLaw, ContactSurface, Diagnostic, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind,
     Material, Rendering, Scene, SceneError, Shape,
 };
 use haptize::{JointVector, MAX_JOINTS};
@@ -144,7 +144,7 @@ fn what_is_not_said_takes_the_documented_default() {
     let joint = &scene.proxy.joints[0];
     assert_eq!((joint.name.as_str(), joint.axis, joint.origin), ("q1", DVec3::Z, DVec3::ZERO));
     assert_eq!((joint.mass, joint.rotor_inertia, joint.nodes[0].radius), (0.0, 1e-3, 0.0));
-    assert_eq!(scene.contact.algorithm, Algorithm::Energy);
+    assert_eq!(scene.contact.law, ContactLaw::Rest);
     assert_eq!((scene.contact.tolerance, scene.contact.max_iterations), (1e-8, 400));
     let axis = scene.grid.axes[0];
     assert_eq!((axis.start, axis.step, axis.count), (-1.0, 0.1, 21));
@@ -183,30 +183,37 @@ fn lines_of_nodes_include_both_ends() {
     assert!(nodes.iter().all(|node| node.radius == 0.01));
 }
 
-/// A dataset holds its scene: one that was solved by an algorithm that is no more still opens.
+/// A dataset holds its scene: one that was solved by a law that is no more still opens.
 #[test]
-fn a_scene_of_a_former_algorithm_is_drawn_and_felt_but_not_solved() {
+fn a_scene_of_a_former_law_is_drawn_and_felt_but_not_solved() {
     let text = LEAST.replace("stiffness = 1000", "stiffness = 1000\nalgorithm = \"linearised\"\nupdates = 2");
     assert!(Rendering::parse(&text, "least.toml").is_ok());
     let text = text.replace("updates = 2", "");
-    assert!(parse(&text).unwrap_err().to_string().contains("take geometry = \"rest\""));
+    assert!(parse(&text).unwrap_err().to_string().contains("take law = \"rest\""));
 }
 
 #[test]
-fn the_law_of_contact_is_named_by_its_geometry_or_by_the_algorithms_former_name() {
-    let algorithm = |entry: &str| {
+fn the_law_of_contact_is_named_by_its_key_or_by_a_former_one() {
+    let law = |entry: &str| {
         let text = LEAST.replace("stiffness = 1000", &format!("stiffness = 1000\n{entry}"));
-        parse(&text).unwrap().contact.algorithm
+        parse(&text).unwrap().contact.law
     };
-    for (geometry, former, expected) in [("following", "energy", Algorithm::Energy), ("rest", "rest", Algorithm::Rest)]
-    {
-        assert_eq!(algorithm(&format!("geometry = \"{geometry}\"")), expected);
-        assert_eq!(algorithm(&format!("algorithm = \"{former}\"")), expected);
+    assert_eq!(law(""), ContactLaw::Rest);
+    let names = [
+        ("following", ContactLaw::Following),
+        ("energy", ContactLaw::Following),
+        ("rest", ContactLaw::Rest),
+        ("paper", ContactLaw::Paper),
+    ];
+    for (name, expected) in names {
+        for key in ["law", "geometry", "algorithm"] {
+            assert_eq!(law(&format!("{key} = \"{name}\"")), expected);
+        }
     }
 }
 
 #[test]
-fn the_smooth_surface_is_touched_unless_the_scene_or_the_algorithm_says_otherwise() {
+fn the_smooth_surface_is_touched_unless_the_scene_or_the_law_says_otherwise() {
     let surface = |contact: &str, node: &str| {
         let text = LEAST
             .replace("{ at = [0.1, 0, 0] }", node)
@@ -217,7 +224,7 @@ fn the_smooth_surface_is_touched_unless_the_scene_or_the_algorithm_says_otherwis
     assert_eq!(surface("", point).unwrap(), ContactSurface::Smooth);
     assert_eq!(surface("", ball).unwrap(), ContactSurface::Smooth);
     assert_eq!(surface("surface = \"facets\"", point).unwrap(), ContactSurface::Facets);
-    assert_eq!(surface("algorithm = \"paper\"", ball).unwrap(), ContactSurface::Facets);
+    assert_eq!(surface("law = \"paper\"", ball).unwrap(), ContactSurface::Facets);
     let refused = surface("surface = \"facets\"", ball).unwrap_err().to_string();
     assert!(refused.contains("leave surface out"), "{refused}");
 }
@@ -273,7 +280,7 @@ fn a_skin_is_told_by_what_one_knows_of_it() {
 fn interpolation_is_smooth_where_there_is_an_energy_to_interpolate() {
     let interpolation = |text: &str| parse(text).unwrap().haptics.interpolation;
     assert_eq!(interpolation(LEAST), Interpolation::Potential);
-    let paper = LEAST.replace("stiffness = 1000", "stiffness = 1000\nalgorithm = \"paper\"");
+    let paper = LEAST.replace("stiffness = 1000", "stiffness = 1000\nlaw = \"paper\"");
     assert_eq!(interpolation(&paper), Interpolation::Linear);
     assert_eq!(interpolation(&format!("{LEAST}[haptics]\ninterpolation = \"linear\"")), Interpolation::Linear);
     let scan = Rendering::load(dataset("sponge.toml")).unwrap();
@@ -317,25 +324,24 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = \"1000\"", "stiffness = \"1000\"", &["string", "rigid"]),
     ("stiffness = 1000", "stiffness = 1000\ntolerance = 0", "tolerance = 0", &["between 0 and 1"]),
     ("stiffness = 1000", "stiffness = 1000\nmax_iterations = 0", "max_iterations", &["at least 1"]),
-    ("stiffness = 1000", "stiffness = 1000\nalgorithm = \"magic\"", "magic", &["`energy`", "`paper`", "`rest`"]),
+    ("stiffness = 1000", "stiffness = 1000\nlaw = \"magic\"", "magic", &["`rest`", "`following`", "`paper`"]),
     ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised", "leave it out"]),
     (
         "stiffness = 1000",
         "stiffness = 1000\nalgorithm = \"linearised\"",
         "linearised",
-        &["no more", "take geometry = \"rest\""],
+        &["no more", "take law = \"rest\""],
     ),
-    ("stiffness = 1000", "stiffness = 1000\ngeometry = \"energy\"", "\"energy\"", &["`rest`", "`following`"]),
     (
         "stiffness = 1000",
-        "stiffness = 1000\ngeometry = \"rest\"\nalgorithm = \"paper\"",
+        "stiffness = 1000\nlaw = \"rest\"\nalgorithm = \"paper\"",
         "algorithm",
-        &["leave algorithm out"],
+        &["duplicate", "`law`"],
     ),
     ("stiffness = 1000", "stiffness = 1000\nsurface = \"round\"", "round", &["facets", "smooth"]),
     (
         "stiffness = 1000",
-        "stiffness = 1000\nalgorithm = \"paper\"\nsurface = \"smooth\"",
+        "stiffness = 1000\nlaw = \"paper\"\nsurface = \"smooth\"",
         "smooth",
         &["defined on the triangles", "leave out"],
     ),

@@ -17,8 +17,8 @@ use std::path::PathBuf;
 
 /// The torque field of a dataset, looked up between grid points as its scene has it felt.
 ///
-/// Field(dataset, interpolation=None): interpolation is "linear", "potential" or "direct", which a
-/// dataset answers by "potential"; by default the scene's.
+/// Field(dataset, interpolation=None): interpolation is "linear" or "potential"; by default the
+/// scene's.
 ///
 /// Each look-up takes a configuration q (rad; m), an array of one entry per joint, or any array of such in its last
 /// axis, and works on all cores. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a
@@ -40,8 +40,8 @@ impl Field {
 }
 
 fn named(name: &str) -> PyResult<Interpolation> {
-    Interpolation::NAMED.into_iter().find(|interpolation| interpolation.name() == name).ok_or_else(|| {
-        let names: Vec<&str> = Interpolation::NAMED.into_iter().map(Interpolation::name).collect();
+    Interpolation::ALL.into_iter().find(|interpolation| interpolation.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = Interpolation::ALL.into_iter().map(Interpolation::name).collect();
         PyValueError::new_err(format!("no interpolation {name:?}: take one of {}", names.join(", ")))
     })
 }

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     scene::{Interpolation, Scene},
-    studies::accuracy::{self, Accuracy, Extent, Limit, Offer, Row, Study},
+    studies::accuracy::{self, Accuracy, Extent, LIVE, Limit, Offer, Row, Study},
     sweep::BackendChoice,
 };
 use serde::Serialize;
@@ -111,13 +111,13 @@ impl Describe for Measured {
             error if error < 0.01 => format!("{} below 0.01 %", row.setting),
             error => format!("{} {error:.2} %", row.setting),
         };
-        let [looked, followed] = [false, true].map(|direct| {
-            let rows = found.of(Study::Lookup).filter(|row| (row.series == Interpolation::Direct.name()) == direct);
+        let [looked, followed] = [false, true].map(|live| {
+            let rows = found.of(Study::Lookup).filter(|row| (row.series == LIVE) == live);
             rows.map(errs).collect::<Vec<_>>().join(", ")
         });
         text.row("look-up", format_args!("`linear` {:.0} ns; errors: {looked}", 1e9 * found.look_up));
         text.row(
-            "direct",
+            "live",
             format_args!(
                 "{:.0} us a solution in contact, by the law at rest; errors, solved {followed}",
                 1e6 * found.solution

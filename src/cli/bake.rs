@@ -13,7 +13,7 @@ use super::{
     watch::{configurations, watched},
 };
 use crate::{
-    scene::{Algorithm, ContactGeometry, Scene},
+    scene::{ContactLaw, Scene},
     store::space::MAX_LEVELS,
     sweep::{Aim, BackendChoice, Bake, Shard, Sweep, SweepReport},
 };
@@ -43,13 +43,10 @@ pub struct Arguments {
     /// The backend that solves contact.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
-    /// The law of contact, instead of the scene's: before which surface depths and directions are taken.
-    #[arg(long, conflicts_with = "algorithm")]
-    geometry: Option<ContactGeometry>,
-    /// How contact is solved, instead of as the scene says: by the paper's iteration, or as --geometry following or
-    /// rest.
+    /// The law of contact, instead of the scene's: depths and directions before the surface at rest or before the
+    /// deformed one, or the paper's iteration.
     #[arg(long)]
-    algorithm: Option<Algorithm>,
+    law: Option<ContactLaw>,
     /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the
     /// measurement of the error, which come last, start again.
     #[arg(long)]
@@ -65,7 +62,7 @@ pub struct Arguments {
     /// Instead of choosing a uniform grid for --max-error, refine the scene's grid where it errs: by up to so many
     /// levels, itself included, each of half the spacing.
     #[arg(long, value_name = "LEVELS", requires = "max_error",
-        conflicts_with_all = ["resume", "algorithm", "geometry", "shard"],
+        conflicts_with_all = ["resume", "law", "shard"],
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
     refine: Option<u32>,
     /// Maximum number of grid points that --max-error may choose.
@@ -85,9 +82,7 @@ pub struct Arguments {
 /// continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut scene = Scene::load(&arguments.scene)?;
-    if let Some(algorithm) = arguments.algorithm.or(arguments.geometry.map(Into::into)) {
-        scene.contact.algorithm = algorithm;
-    }
+    scene.contact.law = arguments.law.unwrap_or(scene.contact.law);
     if let Some(shard) = arguments.shard {
         return run_shard(arguments, &scene, shard.shard(|name| std::env::var(name).ok())?);
     }

@@ -11,12 +11,11 @@ use crate::{
     contact::{Model, NodeForce},
     dataset::{self, Dataset},
     field::TorqueField,
-    object::Object,
+    object::{LatticeError, Object},
     proxy::Chain,
-    scene::{self, Algorithm, AxisSpec, GRID_STEP_SLACK, GridSpec, HapticsSpec, Interpolation, Scene},
+    scene::{self, AxisSpec, GRID_STEP_SLACK, GridSpec, HapticsSpec, Interpolation, Scene},
     sweep::{Inspection, build_object},
 };
-use clap::ValueEnum;
 use glam::DVec3;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -99,6 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let inspected = Inspected {
         interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
         stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
+        lattice: object.lattice_error(&scene.object, &model.compliance),
         solved,
         warnings,
         body: Body { inclusions: info::inclusions(&scene.object), skin: object.skin },
@@ -117,6 +117,9 @@ struct Inspected {
     object_warnings: Vec<String>,
     #[serde(flatten)]
     body: Body,
+    /// Where a lattice fills the object: the error that it makes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lattice: Option<LatticeError>,
     /// Where there is a dataset: what it answers here.
     #[serde(skip_serializing_if = "Option::is_none")]
     interpolated: Option<Interpolated>,
@@ -193,15 +196,9 @@ fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
         .into());
     };
     let wrong = |why: String| format!("{}: the scene in the dataset: {why}", path.display());
-    let mut scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(error.to_string()))?;
+    let law = &dataset.provenance.algorithm;
+    let scene = Scene::of_dataset(&dataset.scene, "scene", law).map_err(|error| wrong(error.to_string()))?;
     dataset.check_scene().map_err(wrong)?;
-    let algorithm = &dataset.provenance.algorithm;
-    scene.contact.algorithm = Algorithm::from_str(algorithm, true).map_err(|_| {
-        wrong(format!(
-            "it was solved by the algorithm `{}`, which is no more: bake it anew",
-            crate::names::escaped(algorithm)
-        ))
-    })?;
     let object = surface.object(&scene.object)?;
     Ok((scene, object, Some(dataset)))
 }
@@ -257,6 +254,7 @@ impl Describe for Inspected {
             text.line(format_args!("  {number:<5} {position} {moved} {force}"));
         }
         self.body.describe(text);
+        self.lattice.iter().for_each(|error| text.row("lattice", error));
         if let Some(Interpolated { interpolation, torque, difference, .. }) = &self.interpolated {
             text.line(format_args!("the dataset, interpolated here ({}):", interpolation.name()));
             text.row("torque", efforts(torque));

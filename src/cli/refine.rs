@@ -15,7 +15,7 @@ use crate::{
     scene::Scene,
     store::Store,
     sweep::{
-        Aim, BackendChoice, ChosenBackend, CpuBackend, Lowered, build_object, check_algorithm, grid_of,
+        Aim, BackendChoice, ChosenBackend, CpuBackend, Lowered, build_object, check_law, grid_of,
         refine::{Judge, Refine},
         sample,
     },
@@ -107,12 +107,13 @@ pub fn run(
     replaced: Option<Replaced>,
 ) -> Result<Report, Failure> {
     let began = Instant::now();
-    check_algorithm(scene)?;
+    check_law(scene)?;
     let aim = goal.aim.checked(scene)?;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     model.with_tangent = true;
+    model.with_slip = scene.haptics.uses_slip();
     let solving = Instant::now();
     let seen = Judge::new(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
@@ -127,7 +128,7 @@ pub fn run(
     let most_memory = announce(&refine, &judges[0], each);
     let refined = refine.fill(&mut judges, &mut backend)?;
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
-    let measured = judges[1].measure(&refined.store);
+    let measured = judges[1].measure(&refined.store, &model);
     let (kept, memory, blocks) = (measured.keeps(aim), refined.store.bytes(), refined.store.blocks().len());
     let provenance = Provenance {
         notices: refined.notices.clone(),
@@ -180,7 +181,7 @@ fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
         refine.base.points()
     ));
     let most = uniform.min(refine.most);
-    let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most);
+    let [memory, disk] = Store::most_bytes(refine.base.axes.len(), most, refine.model.with_slip);
     let time = each.map_or(String::new(), |each| format!("{:.0} s to solve, ", (each * most as f64).ceil()));
     tell(format_args!(
         "haptize: that is at most {most} nodes, which would take about {time}{} of memory, {} more while they are \

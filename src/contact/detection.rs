@@ -235,9 +235,12 @@ impl Detection {
         row_at_rest(model, i, x, &closest).filter(|row| row.depth >= -reach)
     }
 
-    /// The same of the place `x` next to the node (m).
+    /// The row of the place `x` next to the node, before the feature that is closest to the node, continued beyond its
+    /// ends (m).
     pub fn near_at_rest(&self, model: &Model, i: usize, x: DVec3) -> Option<Contact> {
-        row_at_rest(model, i, x, &model.surface.closest(x, self.at_rest[i].last))
+        let mut closest = self.at_rest[i].closest.filter(|closest| closest.triangle != u32::MAX)?;
+        closest.point = model.surface.facet_at_rest(closest.triangle).followed(x, &closest.point);
+        row_at_rest(model, i, x, &closest)
     }
 }
 
@@ -278,7 +281,7 @@ mod tests {
     use crate::proxy::Chain;
     use crate::random::sequence;
     use crate::scene::{
-        Algorithm, ContactSpec, ContactSurface, GroundNodes, GroundSpec, GroundStiffness, JointKind, JointSpec,
+        ContactLaw, ContactSpec, ContactSurface, GroundNodes, GroundSpec, GroundStiffness, JointKind, JointSpec,
         Material, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind, SpringSpec,
     };
 
@@ -346,7 +349,7 @@ mod tests {
             let contact = ContactSpec {
                 stiffness: 1.0,
                 stiffness_per_length: None,
-                algorithm: Algorithm::Energy,
+                law: ContactLaw::Following,
                 tolerance: 1e-8,
                 max_iterations: 1,
                 surface,

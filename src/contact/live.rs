@@ -4,7 +4,7 @@
 use super::detection::Detection;
 use super::equilibrium::rest::{Guess, RestLimits, RestProgram};
 use super::model::Model;
-use super::{NodeForce, Status, reach};
+use super::{NodeForce, Slip, Status, reach};
 use crate::JointVector;
 use crate::proxy::Pose;
 
@@ -89,6 +89,12 @@ impl<'a> LiveSolver<'a> {
             found.status = if is_covered { Status::Contact } else { Status::Overflow };
         }
         found
+    }
+
+    /// Returns the slip of the contacts at `q`, the configuration that was solved last. Never allocates.
+    #[must_use]
+    pub fn slip(&self, q: &[f64]) -> Slip {
+        Slip::of(self.model.chain, q, self.on_proxy.iter().map(|on| (on.node, on.force)))
     }
 
     /// Forces on the proxy's nodes at the configuration that was solved last (N).

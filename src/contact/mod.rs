@@ -20,6 +20,7 @@ mod model;
 mod node_tree;
 mod proximity;
 mod reach;
+mod slip;
 mod solver;
 mod solvers;
 mod thin_parts;
@@ -31,6 +32,7 @@ pub use mesh_ripple::MeshRipple;
 pub use model::{Model, MotionBound};
 pub use node_tree::NodeTree;
 pub use proximity::{NearestNode, Proximity};
+pub use slip::{Slip, exact_dissipation};
 pub use solver::Solver;
 pub(crate) use solvers::{SHARE, Solvers};
 pub use thin_parts::PastMiddle;
@@ -96,6 +98,8 @@ pub struct Equilibrium {
     /// Tangent d tau/d q (N m/rad), where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy` or
     /// `rest`, and the equilibrium is a converged, strict minimum.
     pub tangent: Option<JointMatrix>,
+    /// How the arm slides on its contacts, where the model asks for it ([`Model::with_slip`]) and something touches.
+    pub slip: Option<Slip>,
     /// Contact forces on the object's nodes, ascending by node, each node once (N).
     pub forces: Vec<NodeForce>,
     /// Contacts seen from the proxy.
@@ -115,14 +119,14 @@ impl Equilibrium {
             torque: JointVector::zeros(joints),
             forces: Vec::new(),
             tangent: None,
+            slip: None,
             touches: Vec::new(),
         }
     }
 
-    /// Returns the forces on the proxy's nodes that are touched, ascending by node (N).
-    #[must_use]
-    pub fn on_proxy(&self) -> Vec<NodeForce> {
-        self.touches.iter().map(|touch| NodeForce { node: touch.proxy_node, force: touch.force }).collect()
+    /// Returns the nodes of the proxy that are touched, ascending, and the force on each (N).
+    pub fn on_proxy(&self) -> impl Iterator<Item = (u32, DVec3)> {
+        self.touches.iter().map(|touch| (touch.proxy_node, touch.force))
     }
 }
 

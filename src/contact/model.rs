@@ -31,6 +31,8 @@ pub struct Model<'a> {
     pub shares: Vec<f64>,
     /// Whether each equilibrium comes with its tangent d tau/d q.
     pub with_tangent: bool,
+    /// Whether each equilibrium in contact comes with its slip, on which friction acts.
+    pub with_slip: bool,
     /// The surface at rest.
     pub surface: Arc<RestSurface<'a>>,
     /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(max_nodal_compliance) times
@@ -82,6 +84,7 @@ impl<'a> Model<'a> {
             kc: 0.0,
             shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
             with_tangent: false,
+            with_slip: false,
             surface: Arc::new(RestSurface::new(object, contact.felt_surface())),
         };
         model.measure_compliance();

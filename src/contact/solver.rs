@@ -7,10 +7,10 @@ use super::equilibrium::rest::{Guess, RestProgram};
 use super::linear::support::dot;
 use super::model::Model;
 use super::reach;
-use super::{Equilibrium, NodeForce, Status, Touch};
+use super::{Equilibrium, NodeForce, Slip, Status, Touch};
 use crate::contact::MINIMUM_SQUARE;
 use crate::proxy::Pose;
-use crate::scene::Algorithm;
+use crate::scene::ContactLaw;
 use glam::DVec3;
 
 /// Solves configurations one after another with memory of its own; one per thread.
@@ -68,10 +68,10 @@ impl<'a> Solver<'a> {
     /// residual of one: nothing is balanced.
     #[must_use]
     pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
-        self.find(q, |solver, equilibrium| match solver.model.contact.algorithm {
-            Algorithm::Energy => solver.minimise(None, equilibrium),
-            Algorithm::Paper => solver.iterate(equilibrium),
-            Algorithm::Rest => solver.maximise(equilibrium),
+        self.find(q, |solver, equilibrium| match solver.model.contact.law {
+            ContactLaw::Following => solver.minimise(None, equilibrium),
+            ContactLaw::Paper => solver.iterate(equilibrium),
+            ContactLaw::Rest => solver.maximise(equilibrium),
         })
     }
 
@@ -92,7 +92,7 @@ impl<'a> Solver<'a> {
     /// iterations. With the surface at rest there is one equilibrium, and no search that could start there.
     #[must_use]
     pub fn solve_from(&mut self, q: &[f64], forces: &[NodeForce]) -> Equilibrium {
-        if self.model.contact.algorithm == Algorithm::Rest {
+        if self.model.contact.law == ContactLaw::Rest {
             return self.solve(q);
         }
         let limits =
@@ -122,6 +122,7 @@ impl<'a> Solver<'a> {
         equilibrium.residual = outcome.residual;
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
         self.account(&mut equilibrium);
+        equilibrium.slip = model.with_slip.then(|| Slip::of(model.chain, q, equilibrium.on_proxy()));
         if model.with_tangent && outcome.converged {
             equilibrium.tangent = match self.held_by {
                 HeldBy::Energy => self.energy.tangent(model, &self.pose),

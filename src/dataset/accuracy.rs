@@ -24,6 +24,9 @@ pub struct MeasuredError {
     /// What the geometry at rest leaves out; absent where that was not solved, or not looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<GeometryError>,
+    /// How far friction lies above that of the contacts; absent where the scene names none, or no two touch at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<FrictionExcess>,
 }
 
 /// Difference of contact with the surface at rest from contact with the deformed surface.
@@ -33,6 +36,18 @@ pub struct GeometryError {
     pub rms: f64,
     /// Greatest depth of a node below the surface at rest (m).
     pub depth: f64,
+}
+
+/// What friction takes by the slip of all contacts together ([`crate::contact::Slip`]), over what it would take by each
+/// contact's own, less one: at the configurations with several contacts, moving in random directions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrictionExcess {
+    /// Configurations with several contacts.
+    pub configurations: usize,
+    /// Mean (1).
+    pub mean: f64,
+    /// Greatest (1).
+    pub greatest: f64,
 }
 
 /// Error of the geometry at rest over the rms torque above which [`MeasuredError::lines`] names the remedy (1): what
@@ -82,8 +97,8 @@ impl MeasuredError {
         self.relative().is_some_and(|error| error <= aim)
     }
 
-    /// Errors of each interpolation in percent of the rms torque, a line each, the scene's own interpolation first, and
-    /// last that of the geometry.
+    /// Errors of each interpolation in percent of the rms torque, a line each, the scene's own interpolation first, then
+    /// that of the geometry and the excess of friction.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         if self.configurations == 0 {
@@ -103,12 +118,19 @@ impl MeasuredError {
         let mut lines: Vec<String> = errors.into_iter().map(line).collect();
         if let Some(GeometryError { rms, depth }) = self.geometry {
             let remedy = if rms > TELLING_GEOMETRY * self.torque {
-                ": geometry = \"following\" errs by none of that, and takes 4 to 8 times as long on a CPU"
+                ": law = \"following\" errs by none of that, and takes 4 to 8 times as long on a CPU"
             } else {
                 ""
             };
             let depth = 1e3 * depth;
             lines.push(format!("`geometry` at rest {} rms, at depths up to {depth:.1} mm{remedy}", percent(rms)));
+        }
+        if let Some(FrictionExcess { configurations, mean, greatest }) = self.friction {
+            let [mean, greatest] = [mean, greatest].map(|excess| 100.0 * excess);
+            lines.push(format!(
+                "`friction` up to {greatest:.1} % above that of the contacts, {mean:.1} % on average, where several slip \
+                 ({configurations} configurations)"
+            ));
         }
         lines
     }
@@ -133,6 +155,7 @@ mod tests {
             errors: vec![error, other],
             left_out: 0,
             geometry: None,
+            friction: None,
         };
         assert!((measured.relative().unwrap() - 0.01).abs() < 1e-15);
         assert!(measured.keeps(0.011) && !measured.keeps(0.009));
@@ -144,7 +167,10 @@ mod tests {
         let told =
             |rms| MeasuredError { geometry: Some(GeometryError { rms, depth: 0.0123 }), ..measured.clone() }.lines();
         assert_eq!(told(0.3)[2], "`geometry` at rest 3.0 % rms, at depths up to 12.3 mm");
-        assert!(told(0.6)[2].contains("6.0 % rms") && told(0.6)[2].contains("geometry = \"following\""));
+        assert!(told(0.6)[2].contains("6.0 % rms") && told(0.6)[2].contains("law = \"following\""));
+        let excess = FrictionExcess { configurations: 2, mean: 0.0123, greatest: 0.3 };
+        let told = MeasuredError { friction: Some(excess), ..measured.clone() }.lines();
+        assert!(told[2].contains("up to 30.0 %") && told[2].contains("1.2 % on average"), "{told:?}");
         assert_eq!(MeasuredError::default().lines(), ["nothing touches"]);
         // What was not measured is not taken for perfect.
         let unknown = MeasuredError { interpolation: "direct".into(), ..measured };

@@ -57,6 +57,15 @@ pub enum Error {
         /// This program's version.
         expected: &'static str,
     },
+    /// It holds what earlier versions felt friction and contact damping by.
+    #[error(
+        "{path}: holds contact forces on the arm's nodes, by which an earlier version felt friction and contact \
+         damping; leave contact_damping out of its scene and bake it again"
+    )]
+    Touches {
+        /// The file.
+        path: PathBuf,
+    },
     /// Cut short, altered, or never right.
     #[error("{path}: is damaged: {reason}; copy it again from its source, or bake it again")]
     Damaged {

@@ -23,7 +23,7 @@ mod stored;
 mod summary;
 mod surface;
 
-pub use accuracy::{GeometryError, InterpolationError, MeasuredError};
+pub use accuracy::{FrictionExcess, GeometryError, InterpolationError, MeasuredError};
 pub(crate) use atomic::BUFFER;
 pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
 pub use claim::Claim;
@@ -36,7 +36,7 @@ pub(crate) use file::{
 };
 pub use grid::{Axis, Grid, JointLabel};
 pub use stencil::Stencil;
-pub(crate) use stored::{Axes, CONTACTS, RESULTS, Stored, TOUCHES};
+pub(crate) use stored::{Axes, CONTACTS, RESULTS, Stored};
 pub use summary::{Refinement, StatusCounts, Summary};
 
 use crate::contact::{MeshRipple, NodeForce, Status};
@@ -55,6 +55,9 @@ pub struct Dataset {
     /// side; zeros where nothing touches or there is no derivative. Absent where the interpolation does not use it, and
     /// in scanned datasets (N m/rad).
     pub tangent: Option<Column<f32>>,
+    /// How the proxy slides on its contacts ([`crate::contact::Slip`]); absent where the scene names no friction, and in
+    /// scanned datasets.
+    pub slip: Option<SlipColumns>,
     /// Smallest signed distance of the proxy to the surface at rest (m); more than two grid steps away from every point
     /// in contact it may be a positive lower bound of that, where nothing was solved. Absent in scanned datasets.
     pub gap: Option<Column<f32>>,
@@ -66,8 +69,6 @@ pub struct Dataset {
     pub iterations: Option<Column<u32>>,
     /// On the object's nodes; absent where the scene has no graphics, and in scanned datasets.
     pub contacts: Option<Contacts>,
-    /// On the proxy's nodes; absent where the scene names no effect that acts at contacts, and in scanned datasets.
-    pub touches: Option<Contacts>,
     /// The object's geometry at rest; absent in scanned datasets.
     pub surface: Option<Surface>,
     /// Nodes between the grid's points, and those on them from which the columns were taken; absent where the grid is
@@ -79,11 +80,19 @@ pub struct Dataset {
     pub provenance: Provenance,
 }
 
-/// Contact forces on nodes of the object, f_j, or of the proxy: compressed sparse rows.
+/// Slip of the contacts at each grid point; zeros where nothing touches.
+pub struct SlipColumns {
+    /// N, sum of the normal forces, one number a point (N).
+    pub normal_force: Column<f32>,
+    /// Lower triangle of the symmetric B, row by row, a point's entries side by side (m/rad).
+    pub jacobian: Column<f32>,
+}
+
+/// Contact forces on nodes of the object, f_j: compressed sparse rows.
 pub struct Contacts {
     /// One more than there are points.
     pub offsets: Column<u64>,
-    /// Nodes of the object's surface, or of the proxy; ascending within a row.
+    /// Nodes of the object's surface; ascending within a row.
     pub nodes: Column<u32>,
     /// Three numbers a contact (N).
     pub forces: Column<f32>,
@@ -156,7 +165,7 @@ impl Dataset {
             iterations: None,
             tangent: None,
             contacts: None,
-            touches: None,
+            slip: None,
             surface: None,
             refinement: None,
             scene: String::new(),

@@ -1,7 +1,7 @@
 //! Dataset files, read: mapped or copied, checked as a whole, and cut into columns where they lie.
 
 use super::{
-    CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, Solid, Stored, Surface, TOUCHES, check,
+    CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, SlipColumns, Solid, Stored, Surface, check,
     file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
     store,
 };
@@ -62,6 +62,9 @@ fn no_room(path: &Path, file: &File) -> Error {
     Error::Memory { path: path.into(), shortage: Shortage { needed, left: memory::left().unwrap_or(0) } }
 }
 
+/// A tensor that earlier versions stored for friction.
+const TOUCHES: &str = "touch_offsets";
+
 /// Checks a whole file and makes a dataset of windows into it.
 fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
     let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
@@ -74,6 +77,9 @@ fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
     let (grid, provenance) = container.heading().map_err(damaged)?;
     let scene = container.text("scene").map_err(damaged)?.to_string();
     let Container { windows, tensors, .. } = &mut container;
+    if tensors.contains_key(TOUCHES) {
+        return Err(Error::Touches { path: path.into() });
+    }
     let dataset = windows.dataset(tensors, grid, scene, provenance).map_err(damaged)?;
     container.finish().map_err(damaged)?;
     check::check(&dataset).map_err(damaged)?;
@@ -150,7 +156,16 @@ impl Container {
 
     /// Takes the tensor `name`; `shape` leaves free lengths as `None`. `Err` says what is wrong, or that it is missing.
     pub(crate) fn take<T: Element>(&mut self, name: &str, shape: &[Option<usize>]) -> Result<Column<T>, String> {
-        self.windows.column(&mut self.tensors, name, shape)?.ok_or_else(|| missing(name))
+        self.optional(name, shape)?.ok_or_else(|| missing(name))
+    }
+
+    /// The same; `None` where it is missing.
+    pub(crate) fn optional<T: Element>(
+        &mut self,
+        name: &str,
+        shape: &[Option<usize>],
+    ) -> Result<Option<Column<T>>, String> {
+        self.windows.column(&mut self.tensors, name, shape)
     }
 
     /// Takes the object's geometry; `None` where it is absent. `Err` says what is wrong.
@@ -190,7 +205,7 @@ impl Windows {
             residual: file.optional(Stored::Residual)?,
             iterations: file.optional(Stored::Iterations)?,
             contacts: file.contacts(CONTACTS)?,
-            touches: file.contacts(TOUCHES)?,
+            slip: file.slip()?,
             surface: file.surface()?,
             refinement: None,
             grid,
@@ -250,6 +265,12 @@ impl Arrays<'_> {
             }),
         };
         Ok(Some(Surface { nodes, triangles, solid }))
+    }
+
+    /// The slip of the contacts; `None` where it is absent.
+    fn slip(&mut self) -> Result<Option<SlipColumns>, String> {
+        let Some(normal_force) = self.optional(Stored::NormalForce)? else { return Ok(None) };
+        Ok(Some(SlipColumns { normal_force, jacobian: self.required(Stored::SlipJacobian)? }))
     }
 
     /// Contact forces; `None` where they are absent.

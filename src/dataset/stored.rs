@@ -11,6 +11,8 @@ pub(crate) enum Stored {
     Torque,
     Energy,
     Tangent,
+    NormalForce,
+    SlipJacobian,
     Gap,
     Status,
     Residual,
@@ -18,9 +20,6 @@ pub(crate) enum Stored {
     ContactOffsets,
     ContactNodes,
     ContactForces,
-    TouchOffsets,
-    TouchNodes,
-    TouchForces,
     SurfaceNodes,
     SurfaceTriangles,
     InnerNodes,
@@ -30,14 +29,12 @@ pub(crate) enum Stored {
 }
 
 use Stored::{
-    ContactForces, ContactNodes, ContactOffsets, Energy, Gap, InnerNodes, Iterations, MidNodes, Regions, Residual,
-    Status, SurfaceNodes, SurfaceTriangles, Tangent, Tetrahedra, Torque, TouchForces, TouchNodes, TouchOffsets,
+    ContactForces, ContactNodes, ContactOffsets, Energy, Gap, InnerNodes, Iterations, MidNodes, NormalForce, Regions,
+    Residual, SlipJacobian, Status, SurfaceNodes, SurfaceTriangles, Tangent, Tetrahedra, Torque,
 };
 
 /// Arrays of the contact forces on the object: ends of the rows, nodes and forces.
 pub(crate) const CONTACTS: [Stored; 3] = [ContactOffsets, ContactNodes, ContactForces];
-/// Arrays of those on the proxy.
-pub(crate) const TOUCHES: [Stored; 3] = [TouchOffsets, TouchNodes, TouchForces];
 
 /// What an array is.
 pub(crate) struct Description {
@@ -51,8 +48,8 @@ pub(crate) struct Description {
 }
 
 /// The arrays that a sweep makes, point by point.
-pub(crate) const RESULTS: [Stored; 13] = {
-    let mut results = [Torque; 13];
+pub(crate) const RESULTS: [Stored; 12] = {
+    let mut results = [Torque; 12];
     let mut k = 0;
     while k < results.len() {
         results[k] = DESCRIPTIONS[k].array;
@@ -83,6 +80,8 @@ pub(crate) enum Unit {
     Effort,
     /// That of each joint's stiffness.
     Stiffness,
+    /// That of a slip over each joint's coordinate.
+    Slip,
 }
 
 const ENTRY: &[(&str, usize)] = &[("contact", 0)];
@@ -91,10 +90,12 @@ const POINT: &[(&str, usize)] = &[("point", 0)];
 const NODE: &[(&str, usize)] = &[("node", 0), ("xyz", 3)];
 
 /// By [`Stored`].
-const DESCRIPTIONS: [Description; 19] = [
+const DESCRIPTIONS: [Description; 18] = [
     of(Torque, "torque", Dtype::F64, Axes::Joints("joint"), Unit::Effort),
     of(Energy, "energy", Dtype::F64, Axes::Grid, Unit::Of("J")).or_absent("stored energy"),
     of(Tangent, "tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness),
+    of(NormalForce, "normal_force", Dtype::F32, Axes::Grid, Unit::Of("N")),
+    of(SlipJacobian, "slip_jacobian", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Slip),
     of(Gap, "gap", Dtype::F32, Axes::Grid, Unit::Of("m")).or_absent("gap"),
     of(Status, "status", Dtype::U8, Axes::Grid, Unit::Of("1")),
     of(Residual, "residual", Dtype::F32, Axes::Grid, Unit::Of("1")).or_absent("residuals"),
@@ -102,9 +103,6 @@ const DESCRIPTIONS: [Description; 19] = [
     of(ContactOffsets, "contact_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1")).or_absent("contact forces"),
     of(ContactNodes, "contact_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")),
     of(ContactForces, "contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")),
-    of(TouchOffsets, "touch_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1")),
-    of(TouchNodes, "touch_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")),
-    of(TouchForces, "touch_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")),
     of(SurfaceNodes, "surface_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")).or_absent("the object's surface"),
     of(SurfaceTriangles, "surface_triangles", Dtype::U32, Axes::Own(&[("triangle", 0), ("corner", 3)]), Unit::Of("1")),
     of(InnerNodes, "inner_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")),
@@ -129,10 +127,9 @@ impl Stored {
         DESCRIPTIONS.iter().map(|description| description.array)
     }
 
-    /// The ends of the rows that it is of, where it has rows.
-    pub fn ends(self) -> Option<Self> {
-        let rows = [CONTACTS, TOUCHES].into_iter().find(|[_, nodes, forces]| [*nodes, *forces].contains(&self));
-        rows.map(|[ends, ..]| ends)
+    /// Whether it has an entry for each contact, in rows that end at [`ContactOffsets`].
+    pub fn is_of_contacts(self) -> bool {
+        matches!(self, ContactNodes | ContactForces)
     }
 
     pub const fn description(self) -> &'static Description {
@@ -170,6 +167,7 @@ impl Stored {
         match self.description().unit {
             Unit::Of(unit) => unit.to_owned(),
             Unit::Effort => units(grid, |axis| axis.effort_unit().into()),
+            Unit::Slip => units(grid, |axis| if axis.unit == "m" { "1".into() } else { format!("m/{}", axis.unit) }),
             Unit::Stiffness => units(grid, |axis| format!("{}/{}", axis.effort_unit(), axis.unit)),
         }
     }
@@ -189,12 +187,13 @@ impl Dataset {
             Torque => Some(bytemuck::cast_slice(&self.torque)),
             Energy => self.energy.as_deref().map(bytemuck::cast_slice),
             Tangent => self.tangent.as_deref().map(bytemuck::cast_slice),
+            NormalForce => Some(bytemuck::cast_slice(&self.slip.as_ref()?.normal_force)),
+            SlipJacobian => Some(bytemuck::cast_slice(&self.slip.as_ref()?.jacobian)),
             Gap => self.gap.as_deref().map(bytemuck::cast_slice),
             Status => Some(&self.status),
             Residual => self.residual.as_deref().map(bytemuck::cast_slice),
             Iterations => self.iterations.as_deref().map(bytemuck::cast_slice),
             ContactOffsets | ContactNodes | ContactForces => self.contacts.as_ref()?.stored(array),
-            TouchOffsets | TouchNodes | TouchForces => self.touches.as_ref()?.stored(array),
             SurfaceNodes | SurfaceTriangles | InnerNodes | Tetrahedra | MidNodes | Regions => {
                 self.surface.as_ref()?.stored(array)
             }
@@ -213,9 +212,9 @@ impl Dataset {
 impl Contacts {
     fn stored(&self, array: Stored) -> Option<&[u8]> {
         match array {
-            ContactOffsets | TouchOffsets => Some(bytemuck::cast_slice(&self.offsets)),
-            ContactNodes | TouchNodes => Some(bytemuck::cast_slice(&self.nodes)),
-            ContactForces | TouchForces => Some(bytemuck::cast_slice(&self.forces)),
+            ContactOffsets => Some(bytemuck::cast_slice(&self.offsets)),
+            ContactNodes => Some(bytemuck::cast_slice(&self.nodes)),
+            ContactForces => Some(bytemuck::cast_slice(&self.forces)),
             _ => None,
         }
     }

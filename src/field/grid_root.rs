@@ -110,27 +110,27 @@ impl GridRoot {
         Ok(Potential::new(Arc::new(nodes), free_energy))
     }
 
-    /// The points at the corners of the cell whose first corner lies on the lines `low`.
-    fn corners<const C: usize>(&self, low: &Place) -> [usize; C] {
-        let mut points = [0; C];
-        for (a, (axis, &low)) in self.grid.axes.iter().zip(low).enumerate() {
-            let (near, far) = points.split_at_mut(1 << a);
-            for (near, far) in near.iter_mut().zip(far) {
-                *near = *near * axis.count + low as usize;
-                *far = *near + usize::from(axis.count > 1);
-            }
-        }
-        points
-    }
-
     fn around_in<const C: usize, const W: usize>(&self, fade: f64, cell: &Cell, root: &Root) -> Around {
-        let (points, weights) = (self.corners::<C>(&cell.low), cell.weights::<C>());
+        let (points, weights) = (corners::<C>(&self.grid, &cell.low), cell.weights::<C>());
         let corners = || points.into_iter().zip(weights);
         let linear: f64 = corners().map(|(point, weight)| weight * self.records[point * W].max(0.0)).sum();
         let depth = root.value.max(0.0);
         let share = if depth < linear { depth / linear } else { 1.0 };
         Around { share, ..Around::of(&self.points, fade, corners()) }
     }
+}
+
+/// The points at the corners of the cell of `grid` whose first corner lies on the lines `low`.
+pub(super) fn corners<const C: usize>(grid: &Grid, low: &Place) -> [usize; C] {
+    let mut points = [0; C];
+    for (a, (axis, &low)) in grid.axes.iter().zip(low).enumerate() {
+        let (near, far) = points.split_at_mut(1 << a);
+        for (near, far) in near.iter_mut().zip(far) {
+            *near = *near * axis.count + low as usize;
+            *far = *near + usize::from(axis.count > 1);
+        }
+    }
+    points
 }
 
 /// The change of `number` at `point` of `grid` in a step along `axis`, between the neighbours that have one: central, or
@@ -152,7 +152,7 @@ impl Levels for GridRoot {
     }
 
     fn gather<const C: usize, const W: usize>(&self, _: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
-        for (corner, point) in self.corners::<C>(low).into_iter().enumerate() {
+        for (corner, point) in corners::<C>(&self.grid, low).into_iter().enumerate() {
             let record = &self.records[point * W..(point + 1) * W];
             numbers.iter_mut().zip(record).for_each(|(number, entry)| number[corner] = *entry);
         }

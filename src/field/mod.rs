@@ -2,11 +2,10 @@
 //!
 //! The scene chooses the way ([`Interpolation`]): `linear` (`linear.rs`) interpolates the torque and holds it behind a
 //! boundary layer; `potential` (`potential.rs`) interpolates the energy and takes its gradient, over the points of a
-//! uniform grid (`grid_root.rs`) or the nodes of the store that refines one; `direct`, of a scene that is meant to be
-//! solved live, is `potential` in a dataset. All are continuous and without memory. What they share is in
-//! `points.rs`: the fade outside the grid, what is said of points that were not computed or did not converge, and the
-//! contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is stored (contact, unconverged, overflowed) and 0 at
-//! free points.
+//! uniform grid (`grid_root.rs`) or the nodes of the store that refines one. Both are
+//! continuous and without memory. What they share is in `points.rs`: the fade outside the grid, what is said of points
+//! that were not computed or did not converge, and the contact index `I(q) = sum_c w_c I_c`, I_c = 1 where a torque is
+//! stored (contact, unconverged, overflowed) and 0 at free points.
 //!
 //! Another way is a variant of [`Interpolation`], a file here that implements `Interpolant`, and its line in
 //! [`TorqueField::interpolated`].
@@ -24,6 +23,7 @@ mod linear;
 mod points;
 mod potential;
 pub mod range;
+mod slip;
 mod slope;
 mod stiffness;
 mod work;
@@ -36,7 +36,7 @@ pub(crate) use slope::GRADIENT_STEP;
 
 use crate::{
     JointVector,
-    contact::Status,
+    contact::{Slip, Status},
     dataset::{Dataset, Grid},
     scene::Interpolation,
 };
@@ -44,12 +44,15 @@ use grid_root::GridRoot;
 use linear::Linear;
 use points::Checked;
 use potential::Potential;
+use slip::{GridSlips, SlipField};
 use std::sync::Arc;
 
 /// The contact torque around one object.
 pub struct TorqueField {
     grid: Grid,
     interpolant: Box<dyn Interpolant>,
+    /// Absent where the dataset says nothing of it.
+    slip: Option<SlipField>,
     has_energy: bool,
     is_potential: bool,
 }
@@ -125,16 +128,15 @@ impl TorqueField {
         let interpolant: Box<dyn Interpolant> = match (&dataset.refinement, interpolation) {
             (Some(store), _) => Box::new(Potential::new(Arc::clone(store), 0.0)),
             (None, Interpolation::Linear) => Box::new(Linear::new(Checked::new(dataset)?, threshold, slope)?),
-            (None, Interpolation::Potential | Interpolation::Direct) => {
-                Box::new(GridRoot::potential(Checked::new(dataset)?)?)
-            }
+            (None, Interpolation::Potential) => Box::new(GridRoot::potential(Checked::new(dataset)?)?),
         };
-        Ok(Self {
-            grid,
-            interpolant,
-            has_energy: dataset.energy.is_some(),
-            is_potential: dataset.refinement.is_some() || interpolation.is_potential(),
-        })
+        let is_potential = dataset.refinement.is_some() || interpolation.is_potential();
+        let slip = match (&dataset.refinement, &dataset.slip) {
+            (Some(store), _) => store.has_slips().then(|| SlipField::Store(Arc::clone(store))),
+            (None, Some(slip)) => Some(SlipField::Grid(GridSlips::new(&Checked::new(dataset)?, slip, is_potential)?)),
+            (None, None) => None,
+        };
+        Ok(Self { grid, interpolant, slip, has_energy: dataset.energy.is_some(), is_potential })
     }
 
     /// Number of joints d.
@@ -153,6 +155,21 @@ impl TorqueField {
     #[must_use]
     pub fn has_energy(&self) -> bool {
         self.has_energy
+    }
+
+    /// Whether it is known how contacts slip.
+    #[must_use]
+    pub fn has_slip(&self) -> bool {
+        self.slip.is_some()
+    }
+
+    /// How the contacts slip at `q`, of which `sample` is the field; none out of contact, or where that is not known.
+    /// Never allocates.
+    #[must_use]
+    pub fn slip(&self, q: &[f64], sample: &Sample) -> Slip {
+        let Some(slip) = self.slip.as_ref().filter(|_| sample.contact) else { return Slip::default() };
+        let fade = if sample.flags.contains(Flags::OUTSIDE) { self.grid.fade(q) } else { 1.0 };
+        slip.at(q, if self.is_potential { fade * (2.0 * sample.energy).sqrt() } else { sample.share })
     }
 
     /// Whether the torque is minus the gradient of [`Sample::energy`] inside the grid.

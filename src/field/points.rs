@@ -156,7 +156,7 @@ impl<'a> Checked<'a> {
     }
 }
 
-fn expect(column: &'static str, expected: usize, found: usize) -> Result<(), FieldError> {
+pub(super) fn expect(column: &'static str, expected: usize, found: usize) -> Result<(), FieldError> {
     if expected == found { Ok(()) } else { Err(FieldError::Length { column, expected, found }) }
 }
 

@@ -287,7 +287,7 @@ fn a_linear_object_is_rendered_exactly_by_its_gap_and_by_its_potential() {
             match interpolation {
                 // The paper's boundary and the kink behind it: a quarter of a cell's torque.
                 Interpolation::Linear => assert!(worst > 0.02, "{joints} joints: {worst}"),
-                Interpolation::Potential | Interpolation::Direct => {
+                Interpolation::Potential => {
                     assert!(worst < 1e-12, "{joints} joints: {worst}");
                 }
             }
@@ -562,7 +562,7 @@ fn a_store_of_one_level_is_the_grid_of_its_nodes() {
                 let point = data.grid.point(node.map(|line| line as usize));
                 let energy = data.energy.as_ref().unwrap()[point];
                 let record = root_of(energy, data.torque(point), Some(&tangents[point]));
-                nodes.push(place, &record.iter().map(|x| *x as f32).collect::<Vec<_>>(), 0.0, Status::Contact);
+                nodes.push(place, &record.iter().map(|x| *x as f32).collect::<Vec<_>>(), &[], 0.0, Status::Contact);
             }
             store.publish(0, &block, nodes).unwrap();
         }

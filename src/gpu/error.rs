@@ -61,10 +61,10 @@ pub enum GpuError {
     NoClock(String),
     /// The kernel takes contact with the surface at rest alone.
     #[error(
-        "the GPU solves contact with the surface at rest, not by the algorithm {0}. Name `geometry = \"rest\"` in the \
+        "the GPU solves contact with the surface at rest, not by the law `{0}`. Name `law = \"rest\"` in the \
          scene's [contact], or use --backend cpu"
     )]
-    Algorithm(&'static str),
+    Law(&'static str),
     /// Outputs that no invocation wrote: a dispatch was cut short.
     #[error(
         "the GPU left {count} of {total} results unwritten. Use --backend cpu, and report this with `haptize doctor`"

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     contact,
     proxy::Chain,
-    scene::{Algorithm, JointKind},
+    scene::{ContactLaw, JointKind},
 };
 use glam::DVec3;
 
@@ -57,10 +57,10 @@ impl RestModel {
     /// Uploads a model.
     ///
     /// # Errors
-    /// [`GpuError::Algorithm`] where contact is not at rest, and when a buffer exceeds the device's limits or memory.
+    /// [`GpuError::Law`] where contact is not at rest, and when a buffer exceeds the device's limits or memory.
     pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
-        if model.contact.algorithm != Algorithm::Rest {
-            return Err(GpuError::Algorithm(model.contact.algorithm.name()));
+        if model.contact.law != ContactLaw::Rest {
+            return Err(GpuError::Law(model.contact.law.name()));
         }
         let Parts { parameters, surface, mesh } = Parts::new(model);
         let surface: Vec<[f32; 4]> = surface.into_iter().map(|row| row.map(|number| number as f32)).collect();

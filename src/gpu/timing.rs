@@ -128,7 +128,7 @@ mod tests {
         gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver},
         object::Object,
         proxy::Chain,
-        scene::{Algorithm, ContactSpec, GraphicsEffects, Scene},
+        scene::{ContactLaw, ContactSpec, GraphicsEffects, Scene},
         sweep::{Backend, sample},
     };
     use glam::DVec3;
@@ -156,7 +156,7 @@ mod tests {
     fn the_kernel_of_a_sweep_is_timed_where_that_is_asked_for() {
         let (scene, contexts) = sphere();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
-        let model = Model::new(&object, &chain, ContactSpec { algorithm: Algorithm::Rest, ..scene.contact });
+        let model = Model::new(&object, &chain, ContactSpec { law: ContactLaw::Rest, ..scene.contact });
         let configurations = sample(&scene);
         let [timed, plain] = contexts.map(|context| {
             let mut solver = GpuSolver::new(Arc::clone(&context), &model).unwrap();

@@ -4,7 +4,7 @@ use super::{device::record_length, model::gap_band};
 use crate::{
     JointVector,
     contact::{
-        self, Equilibrium, NodeForce, Status, Touch,
+        self, Equilibrium, NodeForce, Slip, Status, Touch,
         geometry::closest_point::{ClosestPoint, Feature},
         law::depth::Carriers,
     },
@@ -54,6 +54,7 @@ pub(super) fn unpack(
         equilibrium.touches.push(touch(model, words, &mut parts)?);
     }
     equilibrium.touches.sort_by_key(|touch| touch.proxy_node);
+    equilibrium.slip = model.with_slip.then(|| Slip::of(model.chain, q, equilibrium.on_proxy()));
     add_up(parts, &mut equilibrium);
     numbers.iter().all(|number| number.is_finite()).then_some(equilibrium)
 }

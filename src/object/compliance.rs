@@ -2,7 +2,7 @@
 //!
 //! Contact acts on surface nodes only, and only on those that the proxy can reach, so the rows and columns of C at
 //! these nodes are all that it needs: leaving out the others is exact static condensation, not an approximation. K is
-//! fixed per object: one factorisation, then one solve a column, in blocks of columns on all cores.
+//! fixed per object: one factorisation, then half a solve a column (`condensation.rs`).
 //!
 //! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of
 //! nodes is all there is to store and to multiply with, instead of nine.
@@ -10,7 +10,6 @@
 use super::{Attachment, Factor, Object, ObjectError};
 use crate::memory;
 use glam::{DMat3, DVec3};
-use rayon::prelude::*;
 
 /// Dense symmetric matrix over R covered surface nodes (m/N).
 #[derive(Clone, Debug, PartialEq)]
@@ -28,10 +27,6 @@ pub struct Compliance {
 
 /// No place.
 const ABSENT: u32 = u32::MAX;
-
-/// Right-hand sides solved at once: enough for the factor to be read once for many columns, few enough that a block of
-/// columns stays in cache.
-const COLUMNS_PER_SOLVE: usize = 32;
 
 /// Most memory that the dense compliance may take, where so much is left (B): it is what a laptop can hold beside
 /// everything else.
@@ -80,30 +75,15 @@ impl Compliance {
     /// The part of N K^-1 N^T at `covered` ones of the first `surface_nodes` nodes; N is `attachment`.
     fn of(factor: &Factor, attachment: &Attachment, surface_nodes: usize, covered: Vec<u32>) -> Self {
         let rows_per_node = factor.rows_per_node();
-        let order = rows_per_node * covered.len();
         let mut places = vec![ABSENT; surface_nodes];
         covered.iter().zip(0..).for_each(|(&node, place)| places[node as usize] = place);
-        // Row k of N, one for each coordinate of a node.
+        // Rows of N, one for each coordinate of a node.
         let row = |k: usize| {
             let nodes = attachment.row(covered[k / rows_per_node] as usize).iter();
-            nodes.map(move |&(node, weight)| (rows_per_node * node as usize + k % rows_per_node, weight))
+            nodes.map(|&(node, weight)| (rows_per_node * node as usize + k % rows_per_node, weight)).collect()
         };
-        let mut entries = vec![0.0; order * order];
-        entries.par_chunks_mut((COLUMNS_PER_SOLVE * order).max(1)).enumerate().for_each(|(chunk, rows)| {
-            let width = rows.len() / order;
-            let first = chunk * COLUMNS_PER_SOLVE;
-            let mut columns = faer::Mat::zeros(rows_per_node * attachment.columns(), width);
-            for k in 0..width {
-                row(first + k).for_each(|(at, weight)| columns[(at, k)] = weight);
-            }
-            factor.solve_rows(columns.as_mut());
-            for (k, entries) in rows.chunks_exact_mut(order).enumerate() {
-                for (i, entry) in entries.iter_mut().enumerate() {
-                    *entry = row(i).map(|(at, weight)| weight * columns[(at, k)]).sum();
-                }
-            }
-        });
-        symmetrise(&mut entries, order);
+        let rows: Vec<Vec<(usize, f64)>> = (0..rows_per_node * covered.len()).map(row).collect();
+        let entries = factor.condensed(&rows);
         Self { nodes: covered, places, rows_per_node, entries }
     }
 
@@ -141,17 +121,6 @@ impl Compliance {
         }
         let row = |a: usize| DVec3::from_slice(&rows[a * self.order() + 3 * j..][..3]);
         DMat3::from_cols(row(0), row(1), row(2)).transpose()
-    }
-}
-
-/// Replaces C by (C + C^T) / 2: K^-1 is symmetric, its solved columns only to rounding.
-fn symmetrise(entries: &mut [f64], order: usize) {
-    for i in 0..order {
-        for j in 0..i {
-            let mean = 0.5 * (entries[i * order + j] + entries[j * order + i]);
-            entries[i * order + j] = mean;
-            entries[j * order + i] = mean;
-        }
     }
 }
 

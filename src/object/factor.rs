@@ -11,18 +11,19 @@
 
 use super::{
     ObjectError, Stiffness,
-    substitution::{Partition, substitute},
+    condensation::condense,
+    substitution::{Partition, Supernodes, substitute},
 };
 use crate::memory;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::LltError;
 use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
-    supernodal::SupernodalLltRef,
+    CholeskySymbolicParams, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Conj, Mat, MatMut, Par, Side};
+use faer::{Par, Side};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -53,13 +54,12 @@ pub enum FactorError {
 pub struct Factor {
     /// Rows of the factorised matrix per node: 3, or 1 where it stands for each of the three coordinates.
     rows_per_node: usize,
-    symbolic: Arc<SymbolicCholesky<usize>>,
-    values: Arc<[f64]>,
+    /// Row of the matrix that each row of L stands for.
+    order: Arc<[usize]>,
+    supernodes: Arc<Supernodes>,
+    values: Arc<Vec<f64>>,
     partition: Arc<Partition>,
 }
-
-/// One thread a factorisation or solve of many columns: many of them run side by side instead, which scales better.
-const PARALLELISM: Par = Par::Seq;
 
 impl Factor {
     /// Factorises `alpha` K + diag(`diagonal`); `diagonal` has one number per node, for its three coordinates.
@@ -75,11 +75,18 @@ impl Factor {
         let mut rank = vec![0; order.len()];
         order.iter().enumerate().for_each(|(k, &row)| rank[row] = k);
         let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&order, &rank, order.len()));
-        let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, Default::default())
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, params)
             .map_err(|error| resources(&error))?;
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(PARALLELISM, Default::default());
-        // The values are copied once, to where they are shared.
-        let bytes = 2 * symbolic.len_val() * size_of::<f64>() + scratch.size_bytes();
+        let (SymbolicCholeskyRaw::Supernodal(supernodal), Some(order)) = (symbolic.raw(), symbolic.perm()) else {
+            return Err(resources(&"no supernodes"));
+        };
+        let supernodes = Supernodes::new(supernodal);
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let bytes = symbolic.len_val() * size_of::<f64>() + scratch.size_bytes();
         if bytes > memory::SMALL {
             memory::check(bytes).map_err(|shortage| resources(&shortage))?;
         }
@@ -92,80 +99,49 @@ impl Factor {
             matrix.as_ref(),
             Side::Lower,
             Default::default(),
-            PARALLELISM,
+            Par::Seq,
             MemStack::new(&mut scratch),
             Default::default(),
         );
-        match outcome.map(|_| ()) {
-            Ok(()) => {
-                let partition = match symbolic.raw() {
-                    SymbolicCholeskyRaw::Supernodal(symbolic) => Partition::new(symbolic),
-                    SymbolicCholeskyRaw::Simplicial(_) => Partition::default(),
-                };
-                Ok(Self {
-                    rows_per_node,
-                    symbolic: Arc::new(symbolic),
-                    values: values.into(),
-                    partition: Arc::new(partition),
-                })
-            }
+        match outcome {
+            Ok(_) => Ok(Self {
+                rows_per_node,
+                order: order.arrays().0.into(),
+                partition: Arc::new(Partition::new(&supernodes)),
+                supernodes: Arc::new(supernodes),
+                values: Arc::new(values),
+            }),
             Err(LltError::NonPositivePivot { .. }) => Err(FactorError::NotPositiveDefinite),
         }
     }
 
     /// Solves for one vector per node in place: forces (N) become displacements (m) if the matrix is K.
     pub fn solve(&self, vectors: &mut [DVec3]) {
-        match (self.symbolic.raw(), self.symbolic.perm()) {
-            (SymbolicCholeskyRaw::Supernodal(symbolic), Some(order)) => {
-                let factor = SupernodalLltRef::new(symbolic, &self.values);
-                let order = order.arrays().0;
-                if self.rows_per_node == 1 {
-                    let mut right: Vec<DVec3> = order.iter().map(|&node| vectors[node]).collect();
-                    substitute(factor, &self.partition, &mut right);
-                    order.iter().zip(right).for_each(|(&node, solved)| vectors[node] = solved);
-                } else {
-                    let mut right: Vec<f64> = order.iter().map(|&row| vectors[row / 3][row % 3]).collect();
-                    substitute(factor, &self.partition, &mut right);
-                    order.iter().zip(right).for_each(|(&row, solved)| vectors[row / 3][row % 3] = solved);
-                }
-            }
-            // A small matrix, which has no supernodes.
-            _ => {
-                let mut column = Mat::from_fn(3 * vectors.len(), 1, |row, _| vectors[row / 3][row % 3]);
-                self.solve_columns(column.as_mut());
-                for (node, vector) in vectors.iter_mut().enumerate() {
-                    *vector = DVec3::new(column[(3 * node, 0)], column[(3 * node + 1, 0)], column[(3 * node + 2, 0)]);
-                }
-            }
+        let (supernodes, values) = (&*self.supernodes, &**self.values);
+        if self.rows_per_node == 1 {
+            let mut right: Vec<DVec3> = self.order.iter().map(|&node| vectors[node]).collect();
+            substitute(supernodes, values, &self.partition, &mut right);
+            self.order.iter().zip(right).for_each(|(&node, solved)| vectors[node] = solved);
+        } else {
+            let mut right: Vec<f64> = self.order.iter().map(|&row| vectors[row / 3][row % 3]).collect();
+            substitute(supernodes, values, &self.partition, &mut right);
+            self.order.iter().zip(right).for_each(|(&row, solved)| vectors[row / 3][row % 3] = solved);
         }
+    }
+
+    /// Returns R^T A^-1 R, row-major, A being the factorised matrix. `columns`: the entries of each column of R, as row
+    /// of A and value.
+    pub(super) fn condensed(&self, columns: &[Vec<(usize, f64)>]) -> Vec<f64> {
+        let mut ranks = vec![0; self.order.len()];
+        self.order.iter().enumerate().for_each(|(rank, &row)| ranks[row] = rank);
+        let ranked = |column: &Vec<(usize, f64)>| column.iter().map(|&(row, value)| (ranks[row], value)).collect();
+        let columns: Vec<Vec<(usize, f64)>> = columns.iter().map(ranked).collect();
+        condense(&self.supernodes, &self.values, &columns)
     }
 
     /// Rows of the factorised matrix per node: 3, or 1 where it stands for each of the three coordinates.
     pub(super) fn rows_per_node(&self) -> usize {
         self.rows_per_node
-    }
-
-    /// Solves for each column of a 3N x k matrix in place.
-    fn solve_columns(&self, mut columns: MatMut<'_, f64>) {
-        if self.rows_per_node == 3 {
-            self.solve_rows(columns);
-            return;
-        }
-        let (nodes, count) = (columns.nrows() / 3, columns.ncols());
-        let mut apart = Mat::from_fn(nodes, 3 * count, |node, column| columns[(3 * node + column % 3, column / 3)]);
-        self.solve_rows(apart.as_mut());
-        for column in 0..count {
-            for row in 0..3 * nodes {
-                columns[(row, column)] = apart[(row / 3, 3 * column + row % 3)];
-            }
-        }
-    }
-
-    /// Solves the factorised matrix for each column in place.
-    pub(super) fn solve_rows(&self, columns: MatMut<'_, f64>) {
-        let mut scratch = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns.ncols(), PARALLELISM));
-        let factor = LltRef::new(&self.symbolic, &self.values);
-        factor.solve_in_place_with_conj(Conj::No, columns, PARALLELISM, MemStack::new(&mut scratch));
     }
 
     /// Whether [`Factor::solve`] shares its work out among rayon's threads.
@@ -177,7 +153,7 @@ impl Factor {
     /// Memory of the factor (B).
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.values)
+        size_of_val(&**self.values)
     }
 }
 
@@ -274,50 +250,26 @@ mod tests {
     use super::*;
     use glam::DMat3;
 
-    /// A closed chain of 60 nodes with springs to the next and the seventh next, each isotropic, all held by the
-    /// ground.
-    fn isotropic() -> Stiffness {
-        let edges: Vec<[u32; 2]> = (0..60).flat_map(|a| [[a, (a + 1) % 60], [a, (a + 7) % 60]]).collect();
-        let mut stiffness = Stiffness::with_pattern(60, &edges);
-        let block = |k: f64| DMat3::from_diagonal(DVec3::splat(k));
-        for (number, &[a, b]) in edges.iter().enumerate() {
-            let (a, b, k) = (a as usize, b as usize, 200.0 + number as f64);
-            for (row, column, sign) in [(a, a, k), (b, b, k), (a, b, -k), (b, a, -k)] {
-                stiffness.add(row, column, block(sign));
-            }
-        }
-        (0..60).for_each(|node| stiffness.add(node, node, block(30.0)));
-        stiffness
-    }
-
     #[test]
     fn isotropic_springs_need_a_ninth_of_the_factor_and_give_the_same_displacements() {
-        let alike = isotropic();
+        let alike = cube(10);
+        let nodes = alike.nodes();
         // Off by so little that nothing but the way in which it is factorised changes.
         let mut unlike = alike.clone();
         unlike.add(3, 3, DMat3::from_diagonal(DVec3::X * 1e-9));
         assert!(alike.is_isotropic() && !unlike.is_isotropic());
-        let diagonal: Vec<f64> = (0..60).map(|node| 1.0 + 0.1 * f64::from(node)).collect();
+        let diagonal: Vec<f64> = (0..nodes).map(|node| 1.0 + 0.1 * (node % 60) as f64).collect();
         let [small, large] = [&alike, &unlike].map(|matrix| Factor::of(matrix, 0.5, &diagonal).unwrap());
-        assert!(9 * small.bytes() <= large.bytes() + 9 * 60 * 3 * size_of::<f64>(), "{}", small.bytes());
+        // Up to the zeros that supernodes are padded with.
+        assert!(7 * small.bytes() <= large.bytes(), "{} B of {} B", small.bytes(), large.bytes());
 
-        let forces: Vec<DVec3> = (0..60).map(|i| DVec3::new(f64::from(i), -2.0, f64::from(i % 5))).collect();
+        let forces: Vec<DVec3> = (0..nodes).map(|i| DVec3::new(i as f64, -2.0, (i % 5) as f64)).collect();
         let [few, many] = [&small, &large].map(|factor| {
             let mut vectors = forces.clone();
             factor.solve(&mut vectors);
             vectors
         });
         assert!(few.iter().zip(&many).all(|(a, b)| (*a - *b).length() < 1e-11 * b.length()), "{few:?}");
-
-        // Many right-hand sides at once.
-        let columns = |factor: &Factor| {
-            let mut columns = Mat::from_fn(180, 5, |row, column| ((row * (column + 2)) % 11) as f64 - 5.0);
-            factor.solve_columns(columns.as_mut());
-            columns
-        };
-        let (few, many) = (columns(&small), columns(&large));
-        assert!((&few - &many).norm_max() < 1e-11 * many.norm_max());
-        assert!(many.norm_max() > 1e-3);
     }
 
     /// A cube of n x n x n nodes, isotropic springs between neighbours.
@@ -342,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn one_right_hand_side_is_solved_as_many_are() {
+    fn solutions_are_exact_and_the_same_on_any_number_of_threads() {
         let isotropic = cube(20);
         let mut general = cube(10);
         let skewed = DVec3::new(0.6, -0.8, 0.3);
@@ -351,7 +303,6 @@ mod tests {
             let nodes = stiffness.nodes();
             let factor = Factor::of(stiffness, 1.0, &vec![3.0; nodes]).unwrap();
             assert_eq!(factor.is_shared(), shared, "{} B", factor.bytes());
-            assert!(matches!(factor.symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_)), "{nodes} nodes are too few");
             let forces: Vec<DVec3> = (0..nodes).map(|i| DVec3::new((i % 9) as f64, -2.0, (i % 5) as f64)).collect();
             let mut one = forces.clone();
             factor.solve(&mut one);
@@ -360,12 +311,6 @@ mod tests {
                 let mut again = forces.clone();
                 threads.install(|| factor.solve(&mut again));
                 assert!(again == one, "threads leave a trace");
-            }
-            let mut many = Mat::from_fn(3 * nodes, 3, |row, column| forces[row / 3][row % 3] * (column + 1) as f64);
-            factor.solve_columns(many.as_mut());
-            for (node, u) in one.iter().enumerate() {
-                let others = DVec3::new(many[(3 * node, 1)], many[(3 * node + 1, 1)], many[(3 * node + 2, 1)]);
-                assert!((2.0 * *u - others).length() < 1e-12 * others.length(), "node {node}: {u} and {others}");
             }
             let mut resisted = vec![DVec3::ZERO; nodes];
             stiffness.apply(&one, &mut resisted);

@@ -14,7 +14,7 @@
 //! Sharing out is what it is for. On one thread it takes as long as faer's own solve, 24.5 ms and 24.8 with the factor
 //! of 100,000 nodes; on two it takes 14.4 ms, where a frame may last 16.7 (`cargo bench --bench frame`).
 
-use faer::sparse::linalg::cholesky::supernodal::{SupernodalLltRef, SymbolicSupernodalCholesky};
+use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use rayon::prelude::*;
 use std::ops::{AddAssign, Mul, Range, SubAssign};
 
@@ -53,37 +53,86 @@ struct Subtree {
     starts: Vec<usize>,
 }
 
-/// A dense trapezoid of L.
-struct Supernode<'f> {
-    columns: Range<usize>,
-    /// Rows below, ascending.
-    pattern: &'f [usize],
-    values: &'f [f64],
+/// Where L has its entries: for each supernode its columns, the rows below these, and where its values are.
+#[derive(Clone, Debug)]
+pub(super) struct Supernodes {
+    /// First column of each, then the number of columns.
+    begins: Vec<usize>,
+    /// Start of each supernode's rows in `rows`, and their end.
+    patterns: Vec<usize>,
+    rows: Vec<usize>,
+    /// Start of each supernode's values, and their end.
+    values: Vec<usize>,
 }
 
-fn supernode<'f>(symbolic: &'f SymbolicSupernodalCholesky<usize>, values: &'f [f64], s: usize) -> Supernode<'f> {
-    Supernode {
-        columns: symbolic.supernode_begin()[s]..symbolic.supernode_end()[s],
-        pattern: symbolic.supernode(s).pattern(),
-        values: &values[symbolic.col_ptr_for_val()[s]..symbolic.col_ptr_for_val()[s + 1]],
+/// A dense trapezoid of L, column after column.
+pub(super) struct Supernode<'f> {
+    pub columns: Range<usize>,
+    /// Rows below, ascending.
+    pub pattern: &'f [usize],
+    pub values: &'f [f64],
+}
+
+impl Supernodes {
+    pub fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Self {
+        let (mut patterns, mut rows) = (vec![0], Vec::new());
+        for s in 0..symbolic.n_supernodes() {
+            rows.extend_from_slice(symbolic.supernode(s).pattern());
+            patterns.push(rows.len());
+        }
+        let begins = symbolic.supernode_begin().iter().copied().chain(symbolic.supernode_end().last().copied());
+        Self { begins: begins.collect(), patterns, rows, values: symbolic.col_ptr_for_val().to_vec() }
+    }
+
+    /// Number of supernodes.
+    pub fn count(&self) -> usize {
+        self.patterns.len() - 1
+    }
+
+    pub fn columns(&self, s: usize) -> Range<usize> {
+        self.begins[s]..self.begins[s + 1]
+    }
+
+    /// Rows below the supernode's own, ascending.
+    pub fn pattern(&self, s: usize) -> &[usize] {
+        &self.rows[self.patterns[s]..self.patterns[s + 1]]
+    }
+
+    /// The supernode with column `column`.
+    pub fn with(&self, column: usize) -> usize {
+        self.begins.partition_point(|begin| *begin <= column) - 1
+    }
+
+    /// Its parent in the elimination tree, the first that its rows touch; none for a root.
+    pub fn parent(&self, s: usize) -> Option<usize> {
+        self.pattern(s).first().map(|&row| self.with(row))
+    }
+
+    /// The supernode with its part of all `values`.
+    pub fn get<'f>(&'f self, values: &'f [f64], s: usize) -> Supernode<'f> {
+        Supernode {
+            columns: self.columns(s),
+            pattern: self.pattern(s),
+            values: &values[self.values[s]..self.values[s + 1]],
+        }
     }
 }
 
 impl Partition {
     /// Subtrees of a factor large enough to be worth it; else all is the rest.
-    pub fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Self {
-        let count = symbolic.n_supernodes();
-        let entries = symbolic.len_val();
+    pub fn new(supernodes: &Supernodes) -> Self {
+        let count = supernodes.count();
+        let entries = supernodes.values[count];
         if entries < LEAST_FACTOR_TO_SHARE {
             return Self { subtrees: Vec::new(), rest: (0..count).collect() };
         }
         // Of the subtree below each supernode: its entries, its first supernode, and how many there are.
-        let sizes = symbolic.col_ptr_for_val().windows(2).map(|ends| ends[1] - ends[0]);
+        let sizes = supernodes.values.windows(2).map(|ends| ends[1] - ends[0]);
         let mut below: Vec<(usize, usize, usize)> = sizes.enumerate().map(|(s, size)| (size, s, 1)).collect();
         for s in 0..count {
             let (size, first, members) = below[s];
-            if let Some(row) = symbolic.supernode(s).pattern().first() {
-                let parent = &mut below[symbolic.supernode_end().partition_point(|end| end <= row)];
+            if let Some(parent) = supernodes.parent(s) {
+                let parent = &mut below[parent];
                 *parent = (parent.0 + size, parent.1.min(first), parent.2 + members);
             }
         }
@@ -94,7 +143,7 @@ impl Partition {
             s -= 1;
             let (size, first, members) = below[s];
             if size <= most && members == s + 1 - first {
-                partition.subtrees.push(Subtree::new(symbolic, first..s + 1));
+                partition.subtrees.push(Subtree::new(supernodes, first..s + 1));
                 s = first;
             } else {
                 partition.rest.push(s);
@@ -112,9 +161,9 @@ impl Partition {
 }
 
 impl Subtree {
-    fn new(symbolic: &SymbolicSupernodalCholesky<usize>, supernodes: Range<usize>) -> Self {
-        let rows = symbolic.supernode_begin()[supernodes.start]..symbolic.supernode_end()[supernodes.end - 1];
-        let beyond = |s: usize| symbolic.supernode(s).pattern().iter().copied().filter(|&row| row >= rows.end);
+    fn new(all: &Supernodes, supernodes: Range<usize>) -> Self {
+        let rows = all.begins[supernodes.start]..all.begins[supernodes.end];
+        let beyond = |s: usize| all.pattern(s).iter().copied().filter(|&row| row >= rows.end);
         let mut border: Vec<usize> = supernodes.clone().flat_map(beyond).collect();
         border.sort_unstable();
         border.dedup();
@@ -136,8 +185,7 @@ impl Subtree {
 
 /// Solves `L L^T x = right` in place, both in the order of elimination; on rayon's threads where the partition shares
 /// it out.
-pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, partition: &Partition, right: &mut [T]) {
-    let (symbolic, values) = (factor.symbolic(), factor.values());
+pub(super) fn substitute<T: Entry>(supernodes: &Supernodes, values: &[f64], partition: &Partition, right: &mut [T]) {
     let Partition { subtrees, rest } = partition;
     let borders: Vec<Vec<T>> = apart(subtrees, right)
         .into_par_iter()
@@ -145,7 +193,7 @@ pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, par
             let mut border = vec![T::default(); subtree.border.len()];
             let mut below = Vec::new();
             for s in subtree.supernodes.clone() {
-                let supernode = supernode(symbolic, values, s);
+                let supernode = supernodes.get(values, s);
                 supernode.forward(subtree.rows.start, own, &mut below);
                 let (rows, places) = subtree.split(s, supernode.pattern);
                 let mut entries = below.iter();
@@ -160,12 +208,12 @@ pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, par
     }
     let mut below = Vec::new();
     for &s in rest {
-        let supernode = supernode(symbolic, values, s);
+        let supernode = supernodes.get(values, s);
         supernode.forward(0, right, &mut below);
         supernode.pattern.iter().zip(&below).for_each(|(&row, &entry)| right[row] -= entry);
     }
     for &s in rest.iter().rev() {
-        let supernode = supernode(symbolic, values, s);
+        let supernode = supernodes.get(values, s);
         below.clear();
         below.extend(supernode.pattern.iter().map(|&row| right[row]));
         supernode.backward(0, right, &below);
@@ -175,7 +223,7 @@ pub(super) fn substitute<T: Entry>(factor: SupernodalLltRef<'_, usize, f64>, par
     apart(subtrees, right).into_par_iter().zip(borders).for_each(|((subtree, own), border)| {
         let mut below = Vec::new();
         for s in subtree.supernodes.clone().rev() {
-            let supernode = supernode(symbolic, values, s);
+            let supernode = supernodes.get(values, s);
             let (rows, places) = subtree.split(s, supernode.pattern);
             below.clear();
             below.extend(rows.map(|row| own[row]));

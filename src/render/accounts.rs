@@ -1,8 +1,8 @@
 //! Energy accounts of the haptic loop: who gave, who took, and whether anything came from nowhere.
 //!
 //! Over any sequence of steps T_k, the proxy with its coupling obeys to rounding
-//! `Delta(kinetic + spring + bristles) = coupling_work + channel_work + field_work + stop_work - proxy_dissipation -
-//! coupling_dissipation - friction_dissipation - contact_dissipation - control_dissipation`,
+//! `Delta(kinetic + spring + presliding) = coupling_work + channel_work + field_work + stop_work - proxy_dissipation -
+//! coupling_dissipation - friction_dissipation - control_dissipation`,
 //! so that `coupling_work + channel_work + field_work >= 0` from rest: it never gives more than was put in (sections 3,
 //! 3.1). Terms of effects that the scene does not name stay zero.
 //!
@@ -45,20 +45,21 @@ pub struct Accounts {
     pub proxy_dissipation: f64,
     /// Taken by the coupling's damping Bvc.
     pub coupling_dissipation: f64,
-    /// Kept in the bristles of contact friction.
-    pub bristles: f64,
+    /// Kept by contact friction before it slides.
+    pub presliding: f64,
     /// Taken by contact friction.
     pub friction_dissipation: f64,
-    /// Taken by contact damping.
-    pub contact_dissipation: f64,
     /// Taken by the passivity controller at the object's port.
     pub control_dissipation: f64,
-    /// Energy U stored in the object, interpolated; zero for datasets without it.
+    /// Energy stored in the object: U, interpolated, or what is left of it where the object relaxes; zero for datasets
+    /// without it.
     pub stored: f64,
+    /// Lost in the object where it relaxes, and taken by the drag of fresh material.
+    pub relaxed: f64,
     /// Energy stored in the object at the first tick. If the dataset does not hold it: zero if the loop began out of
     /// contact; else nothing is known until contact first ends, and what was given by then is taken for it.
     pub first_stored: Option<f64>,
-    /// Energy that the contact torque gave beyond what the object had stored, field_work + U - U_0: made by the time
+    /// Energy that the contact torque gave beyond what the object had stored, field_work + stored + relaxed - first: made by the time
     /// step, and by interpolation unless that has a potential; zero for datasets without energy.
     pub leak: f64,
     /// Energy that the device's port took in: minus the sum of (torque on the device) . (device displacement).
@@ -78,10 +79,10 @@ pub(super) struct Extra {
     pub channels: JointVector,
     /// Work of contact friction on the proxy (J).
     pub friction_work: f64,
-    /// Energy in the bristles after the step (J).
-    pub bristles: f64,
-    /// Taken by contact damping (J).
-    pub contact_dissipation: f64,
+    /// Energy that friction keeps after the step (J).
+    pub presliding: f64,
+    /// Taken by the drag of fresh material, a part of the contact torque (J).
+    pub drag: f64,
     /// Taken by the passivity controller (J).
     pub control_dissipation: f64,
 }
@@ -94,7 +95,7 @@ impl Accounts {
             ("initial", Some(self.initial)),
             ("kinetic", Some(self.kinetic)),
             ("spring", Some(self.spring)),
-            ("bristles", Some(self.bristles)),
+            ("presliding", Some(self.presliding)),
             ("coupling work", Some(self.coupling_work)),
             ("channel work", Some(self.channel_work)),
             ("field work", Some(self.field_work)),
@@ -102,11 +103,11 @@ impl Accounts {
             ("proxy dissipation", Some(self.proxy_dissipation)),
             ("coupling dissipation", Some(self.coupling_dissipation)),
             ("friction dissipation", Some(self.friction_dissipation)),
-            ("contact dissipation", Some(self.contact_dissipation)),
             ("control dissipation", Some(self.control_dissipation)),
             ("residual", Some(self.residual())),
             ("exchanged", Some(self.exchanged)),
             ("stored", Some(self.stored)),
+            ("relaxed", Some(self.relaxed)),
             ("first stored", self.first_stored),
             ("leak", Some(self.leak)),
             ("port work", Some(self.port_work)),
@@ -118,12 +119,9 @@ impl Accounts {
     #[must_use]
     pub fn residual(&self) -> f64 {
         let given = self.initial + self.absorbed() + self.stop_work;
-        let taken = self.proxy_dissipation
-            + self.coupling_dissipation
-            + self.friction_dissipation
-            + self.contact_dissipation
-            + self.control_dissipation;
-        given - taken - self.kinetic - self.spring - self.bristles
+        let taken =
+            self.proxy_dissipation + self.coupling_dissipation + self.friction_dissipation + self.control_dissipation;
+        given - taken - self.kinetic - self.spring - self.presliding
     }
 
     /// Returns the energy that the proxy and its coupling have taken in and not given back (J): never less than
@@ -153,21 +151,22 @@ impl Accounts {
     /// more than the object can have had.
     #[must_use]
     pub fn created(&self) -> f64 {
-        self.first_stored.map_or(0.0, |first| self.field_work + self.stored - first)
+        self.first_stored.map_or(0.0, |first| self.field_work + self.stored + self.relaxed - first)
     }
 
     /// Returns what damping, friction, stops and controller have taken from the proxy (J).
     #[must_use]
     pub fn taken_from_field(&self) -> f64 {
-        self.proxy_dissipation + self.friction_dissipation + self.contact_dissipation + self.control_dissipation
-            - self.stop_work
+        self.proxy_dissipation + self.friction_dissipation + self.control_dissipation - self.stop_work
     }
 
-    /// Books the state at a tick: what the object has stored, if the dataset holds it, and whether it is touched.
-    pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, stored: Option<f64>, touched: bool) {
+    /// Books the state at a tick: what the object has stored, if the dataset holds it, and has lost since the tick before;
+    /// and whether it is touched.
+    pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, (stored, relaxed): (Option<f64>, f64), touched: bool) {
         self.kinetic = kinetic;
         self.spring = spring;
         self.stored = stored.unwrap_or(0.0);
+        self.relaxed += relaxed;
         if self.first_stored.is_none() {
             self.first_stored = stored.or((!touched).then_some(self.field_work.max(0.0)));
         }
@@ -221,12 +220,11 @@ impl Accounts {
             self.channel_work += channel;
             self.exchanged += damper.abs() + heat + drag + field.abs() + channel.abs();
         }
+        self.field_work -= extra.drag;
         self.stop_work += step.stop_work;
-        self.friction_dissipation += self.bristles - extra.bristles - extra.friction_work;
-        self.bristles = extra.bristles;
-        self.contact_dissipation += extra.contact_dissipation;
+        self.friction_dissipation += self.presliding - extra.presliding - extra.friction_work;
+        self.presliding = extra.presliding;
         self.control_dissipation += extra.control_dissipation;
-        self.exchanged +=
-            step.stop_work.abs() + extra.friction_work.abs() + extra.contact_dissipation + extra.control_dissipation;
+        self.exchanged += step.stop_work.abs() + extra.friction_work.abs() + extra.drag + extra.control_dissipation;
     }
 }

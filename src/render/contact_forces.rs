@@ -82,7 +82,8 @@ impl ContactForces {
 /// The scene of `dataset`, prepared to be solved with the geometry that it holds.
 fn solved(dataset: &Dataset, surface: &Surface, nodes: usize) -> Result<Direct, GraphicsError> {
     let wrong = |error: &dyn std::fmt::Display| GraphicsError::Solved(error.to_string());
-    let scene = Scene::parse(&dataset.scene, "scene").map_err(|error| wrong(&error))?;
+    let scene =
+        Scene::of_dataset(&dataset.scene, "scene", &dataset.provenance.algorithm).map_err(|error| wrong(&error))?;
     let object = surface.object(&scene.object).map_err(|error| wrong(&error))?;
     if object.rest.len() != nodes {
         return Err(GraphicsError::Rows { nodes });

@@ -8,8 +8,7 @@
 //! [`Haptics::restart`]. So it is when the passivity observer of the device's port finds that the hand has been given
 //! energy from nowhere ([`Fault::Energy`]).
 //!
-//! What the scene may name beside (channels, controller, effects at contacts) is decided once, in [`Haptics::new`] and
-//! [`Haptics::with_effects`]; what it does not name has no state and does no work.
+//! What the scene may name beside (channels, controller, friction, relaxation) is decided once, in [`Haptics::new`]; what it does not name has no state and does no work.
 
 pub use super::inputs::Inputs;
 use super::{
@@ -17,16 +16,17 @@ use super::{
     channels::{ChannelState, Channels},
     control::PassivityControl,
     coupling::Coupling,
-    effects::{ContactEffects, EffectState, Pending},
     flags::{Fault, Flags},
+    friction::{Friction, FrictionState, Pending},
     npmi::{Motion, Npmi},
+    relaxation::{Memory, Relaxation, Remembered},
     source::{ContactSession, TorqueSource},
     torque_history::TorqueHistory,
     watchdog::{self, GREATEST_POSITION_AGE, TickRate, Watchdog},
 };
 use crate::{
     JointVector,
-    contact::NodeForce,
+    contact::Slip,
     field::{Sample, range::HaptizedRange},
     scene::HapticsSpec,
 };
@@ -44,7 +44,8 @@ pub struct Haptics {
     /// Absent unless the scene names them.
     channels: Option<Channels>,
     control: Option<PassivityControl>,
-    effects: Option<ContactEffects>,
+    friction: Option<Friction>,
+    relaxation: Option<Relaxation>,
     watchdog: Watchdog,
     torque_limit: JointVector,
     torque_rate_limit: JointVector,
@@ -68,7 +69,8 @@ pub struct State {
     fault: Option<Fault>,
     accounts: Accounts,
     channels: Option<ChannelState>,
-    effects: Option<EffectState>,
+    friction: Option<FrictionState>,
+    memory: Option<Memory>,
 }
 
 /// Output of a tick. All but `torque` is for recording and drawing.
@@ -88,6 +90,15 @@ pub struct Output {
     pub fault: Option<Fault>,
     /// At t_k.
     pub accounts: Accounts,
+}
+
+/// Contact at the proxy.
+struct Felt {
+    /// As it would be without a past.
+    elastic: Sample,
+    /// As it is.
+    sample: Sample,
+    remembered: Remembered,
 }
 
 /// Field, proxy and gains do not make a loop.
@@ -137,7 +148,8 @@ impl Haptics {
             coupling,
             channels,
             control,
-            effects: None,
+            friction: spec.friction.as_ref().map(Friction::new),
+            relaxation: spec.relaxation.as_ref().map(|spec| Relaxation::new(spec, period)),
             watchdog,
             torque_limit,
             torque_rate_limit,
@@ -145,22 +157,10 @@ impl Haptics {
         })
     }
 
-    /// The same loop with `effects` at the contacts.
-    #[must_use]
-    pub fn with_effects(self, effects: Option<ContactEffects>) -> Self {
-        Self { effects, ..self }
-    }
-
     /// The same loop with a proxy that stays in `range`, a range of the same dataset.
     #[must_use]
     pub fn with_range(self, range: HaptizedRange) -> Self {
         Self { range, ..self }
-    }
-
-    /// The effects at the contacts, if the scene names any.
-    #[must_use]
-    pub fn effects(&self) -> Option<&ContactEffects> {
-        self.effects.as_ref()
     }
 
     /// Number of joints d.
@@ -198,7 +198,8 @@ impl Haptics {
             fault: None,
             accounts: Accounts::default(),
             channels: None,
-            effects: self.effects.as_ref().map(ContactEffects::start),
+            friction: None,
+            memory: None,
         };
         self.begin(&mut state, position);
         Ok(state)
@@ -225,9 +226,8 @@ impl Haptics {
         let initial = self.coupling.spring_energy(&state.motion.position, position);
         state.accounts = Accounts { initial, ..Accounts::default() };
         state.channels = self.channels.as_ref().map(Channels::start);
-        if let Some(effects) = &mut state.effects {
-            effects.release();
-        }
+        state.friction = self.friction.map(|_| FrictionState::at_rest(self.joints()));
+        state.memory = self.relaxation.map(|_| Memory::default());
     }
 
     /// One tick. Over a scene that is solved in every tick this makes room for that each time: a session has its own
@@ -254,10 +254,11 @@ impl Haptics {
             state.accounts.device_moved(&self.coupling, inputs.elapsed, moved, &proxy, torque);
             state.device = inputs.position;
         }
-        let (sample, age) = contact.sample(&proxy);
+        let (elastic, age) = contact.sample(&proxy);
+        let (sample, remembered) = self.remember(state, &elastic);
         let stored = self.source.has_energy().then_some(sample.energy);
         let spring = self.coupling.spring_energy(&proxy, &state.device);
-        state.accounts.at_tick(state.motion.kinetic_energy(), spring, stored, sample.index > 0.0);
+        state.accounts.at_tick(state.motion.kinetic_energy(), spring, (stored, remembered.relaxed), sample.index > 0.0);
         let accounts = state.accounts;
         if fault.is_none() && accounts.device_port().is_some_and(|port| port < -GREATEST_GIVEN_ENERGY) {
             fault = Some(Fault::Energy);
@@ -281,8 +282,25 @@ impl Haptics {
         state.held.push(&torque);
 
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
-        let stopped = self.move_proxy(state, interval, &velocity, &sample, contact.forces());
+        let felt = Felt { elastic, sample, remembered };
+        let stopped = self.move_proxy(state, interval, &velocity, &felt, contact);
         Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
+    }
+
+    /// Returns what is felt of the `elastic` contact at the proxy, after what the object remembers of its past.
+    fn remember(&self, state: &mut State, elastic: &Sample) -> (Sample, Remembered) {
+        let (Some(relaxation), Some(memory)) = (&self.relaxation, &mut state.memory) else {
+            return (*elastic, Remembered { share: 1.0, stored: elastic.energy, relaxed: 0.0 });
+        };
+        let remembered = relaxation.arrive(memory, elastic.energy);
+        let mut sample = Sample { energy: remembered.stored, ..*elastic };
+        sample.torque.iter_mut().for_each(|tau| *tau *= remembered.share);
+        sample.share *= remembered.share;
+        sample.contact &= remembered.share > 0.0;
+        if !sample.contact {
+            sample.contact_nodes = 0;
+        }
+        (sample, remembered)
     }
 
     /// Returns the torque to command to the device, which moves at `velocity`: coupling, channels, controller [N m or
@@ -308,16 +326,17 @@ impl Haptics {
         torque
     }
 
-    /// One step of the proxy over `interval` (s), booked; what stopped it. The device moves at `velocity`, and contact
-    /// forces are `solved` at the proxy.
+    /// One step of the proxy over `interval` (s), booked; what stopped it. The device moves at `velocity`, and `contact`
+    /// was sampled at the proxy.
     fn move_proxy(
         &self,
         state: &mut State,
         interval: f64,
         velocity: &JointVector,
-        sample: &Sample,
-        solved: &[NodeForce],
+        felt: &Felt,
+        contact: &mut ContactSession<'_>,
     ) -> Flags {
+        let Felt { elastic, sample, remembered } = felt;
         let stage = self.npmi.stage(&state.motion, interval);
         let limits = self.npmi.limits();
         let stops = self.range.stops(&state.motion.position, &state.motion.velocity, interval, limits);
@@ -325,8 +344,8 @@ impl Haptics {
         let mut extra = Extra {
             channels: JointVector::zeros(self.joints()),
             friction_work: 0.0,
-            bristles: 0.0,
-            contact_dissipation: 0.0,
+            presliding: 0.0,
+            drag: 0.0,
             control_dissipation: 0.0,
         };
         // After a fault nothing is known of the hand any more: its channel falls silent.
@@ -339,14 +358,26 @@ impl Haptics {
             rate = control.proxy_rate(&state.accounts, interval, &state.motion);
             stage.add_inertia(rate, &mut load.damping);
         }
-        let step = match (&self.effects, &mut state.effects) {
-            (Some(effects), Some(memory)) => {
-                let share = if sample.contact { sample.share } else { 0.0 };
-                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, load, share, solved };
-                effects.step(pending, memory, &mut state.motion, &mut extra)
+        let mut slip = Slip::default();
+        if self.friction.is_some() || self.relaxation.is_some_and(|relaxation| relaxation.needs_slip()) {
+            slip = contact.slip(&state.motion.position, elastic);
+            slip.normal_force *= remembered.share;
+        }
+        let mut damper = 0.0;
+        if let (Some(relaxation), Some(memory)) = (&self.relaxation, &state.memory) {
+            damper = relaxation.drag(memory, elastic.energy, &slip, &state.proxy_velocity, &mut load);
+        }
+        let step = match (&self.friction, &mut state.friction) {
+            (Some(friction), Some(memory)) => {
+                let velocity = state.proxy_velocity;
+                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, velocity, load };
+                friction.step(&pending, &slip, memory, &mut state.motion, &mut extra)
             }
             _ => self.npmi.advance(&stage, &mut state.motion, interval, &load),
         };
+        if let (Some(relaxation), Some(memory)) = (&self.relaxation, &mut state.memory) {
+            extra.drag = relaxation.depart(memory, interval, &step.velocity, &slip, damper);
+        }
         extra.control_dissipation = interval * rate * stage.twice_kinetic_energy(&step.velocity);
         state.proxy_velocity = step.velocity;
         state.accounts.stepped(&self.coupling, interval, velocity, &sample.torque, &step, &extra);

@@ -7,11 +7,11 @@
 
 use crate::{
     JointMatrix, JointVector,
-    contact::{LiveContact, LiveSolver, Model, NodeForce, Solvers, Status},
+    contact::{LiveContact, LiveSolver, Model, Slip, Solvers, Status},
     dataset::{Axis, Dataset, Grid, Surface},
     field::{Flags, Sample},
     object::Object,
-    scene::{Algorithm, Scene},
+    scene::{ContactLaw, Scene},
     sweep::{BakeError, CpuBackend, Direct, build_object, sample},
 };
 
@@ -47,8 +47,8 @@ impl LiveScene {
     /// # Errors
     /// When its compliance cannot be formed.
     pub fn of(mut scene: Scene, object: Object) -> Result<Self, BakeError> {
-        let follows = scene.contact.algorithm != Algorithm::Rest;
-        scene.contact.algorithm = Algorithm::Rest;
+        let follows = scene.contact.law != ContactLaw::Rest;
+        scene.contact.law = ContactLaw::Rest;
         let direct = Direct::of(&scene, object)?;
         let grid = region(&scene, direct.model().compliance.is_whole());
         let tangents = tangents(direct.model(), &sample(&scene));
@@ -142,6 +142,7 @@ pub struct LiveSession<'a> {
     /// What was felt last, and how many ticks ago it was solved.
     felt: Sample,
     age: u32,
+    slip: Slip,
 }
 
 impl<'a> LiveSession<'a> {
@@ -150,7 +151,7 @@ impl<'a> LiveSession<'a> {
     pub fn new(scene: &'a LiveScene) -> Self {
         let model = scene.direct.model();
         let felt = Sample { torque: JointVector::zeros(model.chain.joints.len()), share: 1.0, ..Sample::default() };
-        Self { solver: LiveSolver::new(model), felt, age: 0 }
+        Self { solver: LiveSolver::new(model), felt, age: 0, slip: Slip::default() }
     }
 
     /// Contact at `q`, and how many ticks ago it was solved. Never allocates.
@@ -167,8 +168,12 @@ impl<'a> LiveSession<'a> {
         (self.felt, self.age)
     }
 
-    /// Forces on the proxy's nodes where contact was sampled last (N).
-    pub(super) fn forces(&self) -> &[NodeForce] {
-        self.solver.on_proxy()
+    /// How the contacts slip at `q`, where contact was sampled last; as long as that is not solved, as they did before.
+    /// Never allocates.
+    pub(super) fn slip(&mut self, q: &[f64]) -> Slip {
+        if self.age == 0 {
+            self.slip = self.solver.slip(q);
+        }
+        self.slip
     }
 }

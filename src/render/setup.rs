@@ -2,7 +2,6 @@
 //! its surface the object. A scene that is solved live is rendered like a dataset in which nothing is stored.
 
 use super::{
-    effects::{ContactEffects, EffectError},
     graphics::{ContactForces, Graphics, GraphicsError},
     haptic::{Haptics, JointsError},
     live::LiveScene,
@@ -19,7 +18,10 @@ use crate::{
     field::{FieldError, TorqueField, range::HaptizedRange},
     object::{Object, ObjectError},
     proxy::Chain,
-    scene::{BOUNDARY_SLOPE, HapticsSpec, Interpolation, LEVER_ARM, ProxyInertia, Rendering, SceneError, THRESHOLD},
+    scene::{
+        BOUNDARY_SLOPE, Diagnostic, HapticsSpec, Interpolation, LEVER_ARM, LINEAR_RELAXATION, ProxyInertia, Rendering,
+        SceneError, THRESHOLD,
+    },
 };
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -71,7 +73,7 @@ pub enum SetupError {
     Loop(#[from] JointsError),
     /// An effect that the scene names cannot act.
     #[error("the scene in the dataset: {0}")]
-    Effect(#[from] EffectError),
+    Effect(#[from] Diagnostic),
     /// An effect on what is drawn, and nothing to draw.
     #[error(
         "the scene in the dataset: {0} acts on the object that contact forces move, and the dataset does not hold the \
@@ -249,8 +251,21 @@ fn haptic_loop(
     };
     let bounds = passivity::bounds(&gains, &source, &labels(&dataset.grid));
     let advice = passivity::advice(&gains, &source, &bounds);
-    let effects = ContactEffects::new(&gains, (dataset, live.is_some()), chain, &scene.text, &scene.path)?;
-    let haptics = Haptics::new(source, npmi, &gains)?.with_range(range).with_effects(effects);
+    if gains.relaxation.is_some() && !source.is_potential() {
+        return Err(Diagnostic::at(&scene.path, &scene.text, "object.relaxation", LINEAR_RELAXATION.to_owned()).into());
+    }
+    if gains.uses_slip() && !source.has_slip() {
+        let (name, place) = match gains.friction {
+            Some(_) => ("friction", "haptics.friction"),
+            None => ("dent", "object.relaxation.dent"),
+        };
+        let message = format!(
+            "{name} needs to know how contacts slip, which the dataset does not hold: bake a virtual object again with \
+             this scene; for a real object, which tells no contacts, leave {name} out"
+        );
+        return Err(Diagnostic::at(&scene.path, &scene.text, place, message).into());
+    }
+    let haptics = Haptics::new(source, npmi, &gains)?.with_range(range);
     Ok(Loop { haptics, bounds, gains, advice })
 }
 

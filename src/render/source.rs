@@ -3,7 +3,7 @@
 use super::live::{LiveScene, LiveSession};
 use crate::{
     JointVector,
-    contact::NodeForce,
+    contact::Slip,
     dataset::Grid,
     field::{Sample, TorqueField},
 };
@@ -65,6 +65,15 @@ impl TorqueSource {
         }
     }
 
+    /// Whether it is known how contacts slip.
+    #[must_use]
+    pub fn has_slip(&self) -> bool {
+        match self {
+            Self::Dataset(field) => field.has_slip(),
+            Self::Live(_) => true,
+        }
+    }
+
     /// Whether the torque is minus the gradient of that energy.
     #[must_use]
     pub fn is_potential(&self) -> bool {
@@ -104,11 +113,12 @@ impl ContactSession<'_> {
         }
     }
 
-    /// Forces on the proxy's nodes that were solved at the configuration sampled last (N).
-    pub(super) fn forces(&self) -> &[NodeForce] {
+    /// How the contacts slip at `q`, the configuration that was sampled last, of which `sample` is the field. Never
+    /// allocates.
+    pub(super) fn slip(&mut self, q: &[f64], sample: &Sample) -> Slip {
         match self {
-            Self::Dataset(_) => &[],
-            Self::Live(session) => session.forces(),
+            Self::Dataset(field) => field.slip(q, sample),
+            Self::Live(session) => session.slip(q),
         }
     }
 }

@@ -14,11 +14,18 @@ use toml::{
 
 /// What must be a table, `*` for each entry of a list: serde would take a list of its values as well, without a name.
 const TABLES: &str = "object object.sphere object.mesh object.tetrahedra object.springs object.elasticity \
-    object.elasticity.inclusion.* object.elasticity.inclusion.*.sphere object.skin object.ground proxy proxy.joint.* \
+    object.elasticity.inclusion.* object.elasticity.inclusion.*.sphere object.skin object.ground \
+    object.relaxation proxy proxy.joint.* \
     proxy.joint.*.nodes.* proxy.shape.* proxy.shape.*.cylinder proxy.shape.*.surface contact grid grid.axes.* scan \
     scan.workspace scan.workspace.across.* scan.workspace.depth scan.joints scan.joints.axes.* scan.control \
     scan.limits scan.simulated haptics haptics.friction haptics.four_channel haptics.hand graphics.stiffening motion \
     motion.press.* motion.scrape.* device";
+
+/// Keys that earlier versions read, and what to do without them.
+const REMOVED: [(&str, &str); 2] = [
+    ("haptics.contact_damping", "contact_damping is no more: leave it out, or give the coupling more coupling_damping"),
+    ("haptics.friction.damping", "friction has no damping of its own any more, the coupling's damps it: leave it out"),
+];
 
 /// The text that is being checked.
 pub(super) struct Checker<'a> {
@@ -42,6 +49,9 @@ impl Checker<'_> {
             let lists = |path: &str| list(root.get_ref(), path.split('.'));
             if let Some(place) = TABLES.split(' ').find_map(lists) {
                 return Err(self.error(place, "this is a list of values, and it must be a table: name each value"));
+            }
+            if let Some((path, remedy)) = REMOVED.into_iter().find(|(path, _)| self.has(path)) {
+                return Err(self.at(path, remedy));
             }
         }
         toml::from_str(self.text).map_err(|error| {

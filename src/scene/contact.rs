@@ -3,10 +3,14 @@
 use super::check::Checker;
 use super::value::{KEY, Range, defaults, positive, share};
 use super::{ProxySpec, SceneError};
+use clap::ValueEnum;
 use serde::de::{Deserialize, Deserializer, Error, IgnoredAny};
 
-/// What [`Algorithm::Rest`] took the place of; datasets of it are still read.
+/// What [`ContactLaw::Rest`] took the place of; datasets of it are still read.
 const LINEARISED: &str = "linearised";
+
+/// Keys that name the law of contact: the last two in former scenes.
+pub(super) const LAW_KEYS: [&str; 3] = ["law", "geometry", "algorithm"];
 
 /// Equation (2) and how it is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +23,7 @@ pub struct ContactSpec {
     /// Contact stiffness of a link per length of it, in the energy form, where the scene gives that (N/m^2).
     pub stiffness_per_length: Option<f64>,
     /// How equation (2) is solved.
-    pub algorithm: Algorithm,
+    pub law: ContactLaw,
     /// Relative residual at which a configuration counts as converged (1).
     pub tolerance: f64,
     /// After as many a configuration that has not converged is flagged.
@@ -36,37 +40,17 @@ pub(super) struct ContactTable {
     stiffness: f64,
     #[serde(default, deserialize_with = "positive")]
     stiffness_per_length: Option<f64>,
-    geometry: Option<ContactGeometry>,
-    /// `None` where it is one that is no more.
-    #[serde(default = "default_algorithm", deserialize_with = "algorithm")]
-    pub algorithm: Option<Algorithm>,
+    /// `None` where it is one that is no more. Former scenes named it by `geometry` or `algorithm`.
+    #[serde(default = "default_law", deserialize_with = "law", alias = "geometry", alias = "algorithm")]
+    pub law: Option<ContactLaw>,
     #[serde(default = "tolerance", deserialize_with = "share")]
     tolerance: f64,
     #[serde(default = "max_iterations", deserialize_with = "at_least_one")]
     max_iterations: u32,
     #[serde(default)]
     surface: ContactSurface,
-    /// Of an algorithm that is no more.
+    /// Of a law that is no more.
     updates: Option<IgnoredAny>,
-}
-
-/// Before which surface depth and direction of a contact node are taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ContactGeometry {
-    /// The undeformed surface: a convex problem, with one solution.
-    Rest,
-    /// The deformed surface.
-    Following,
-}
-
-impl From<ContactGeometry> for Algorithm {
-    fn from(geometry: ContactGeometry) -> Self {
-        match geometry {
-            ContactGeometry::Rest => Self::Rest,
-            ContactGeometry::Following => Self::Energy,
-        }
-    }
 }
 
 /// Which surface of a mesh the proxy feels.
@@ -81,10 +65,10 @@ pub enum ContactSurface {
 }
 
 impl ContactSpec {
-    /// The surface that the algorithm feels: the paper's iteration is defined on facets.
+    /// The surface that the law feels: the paper's iteration is defined on facets.
     #[must_use]
     pub fn felt_surface(&self) -> ContactSurface {
-        if self.algorithm == Algorithm::Paper { ContactSurface::Facets } else { self.surface }
+        if self.law == ContactLaw::Paper { ContactSurface::Facets } else { self.surface }
     }
 
     /// Returns Kc of a node that stands for `length` of a link (m), in (N/m): with a stiffness per length k' the third
@@ -107,25 +91,26 @@ impl ContactSpec {
 
 /// How equation (2) is solved for one configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum)]
-pub enum Algorithm {
-    /// Minimum of the stored energy; geometry follows the deformation.
-    #[default]
-    Energy,
-    /// The paper's four-step iteration (section 2.1).
-    Paper,
+pub enum ContactLaw {
     /// Minimum of the stored energy with depths and directions before the surface at rest: a convex problem, with one
     /// solution.
+    #[default]
     Rest,
+    /// Minimum of the stored energy with depths and directions before the deformed surface.
+    #[value(alias = "energy")]
+    Following,
+    /// The paper's four-step iteration (section 2.1).
+    Paper,
 }
 
-impl Algorithm {
-    /// As a dataset's provenance names it.
+impl ContactLaw {
+    /// As a scene and a dataset's provenance name it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Energy => "energy",
-            Self::Paper => "paper",
             Self::Rest => "rest",
+            Self::Following => "following",
+            Self::Paper => "paper",
         }
     }
 }
@@ -146,20 +131,19 @@ fn at_least_one<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
     }
 }
 
-fn default_algorithm() -> Option<Algorithm> {
-    Some(Algorithm::default())
+fn default_law() -> Option<ContactLaw> {
+    Some(ContactLaw::default())
 }
 
-/// Reads how contact is solved, by its name; `None` for [`LINEARISED`].
-fn algorithm<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Algorithm>, D::Error> {
+/// Reads the law of contact, by its name; `None` for [`LINEARISED`].
+fn law<'de, D: Deserializer<'de>>(value: D) -> Result<Option<ContactLaw>, D::Error> {
     let name = String::deserialize(value)?;
-    let known = <Algorithm as clap::ValueEnum>::value_variants();
-    let found = known.iter().copied().find(|known| known.name() == name);
+    let found = ContactLaw::from_str(&name, false).ok();
     if found.is_some() || name == LINEARISED {
         return Ok(found);
     }
-    let names: Vec<String> = known.iter().map(|known| format!("`{}`", known.name())).collect();
-    Err(D::Error::custom(format!("unknown algorithm {name:?}: take one of {}", names.join(", "))))
+    let names: Vec<String> = ContactLaw::value_variants().iter().map(|known| format!("`{}`", known.name())).collect();
+    Err(D::Error::custom(format!("unknown law of contact {name:?}: take one of {}", names.join(", "))))
 }
 
 /// Reads a stiffness: a positive number, or `"rigid"` for infinity.
@@ -173,20 +157,13 @@ impl ContactTable {
         let nodes = || proxy.joints.iter().flat_map(|joint| &joint.nodes);
         let error = |key: &str, message: &str| Err(checker.at(&format!("contact.{key}"), message));
         if self.updates.is_some() {
-            return error("updates", "updates acted on the algorithm \"linearised\", which is no more: leave it out");
+            return error("updates", "updates acted on the law \"linearised\", which is no more: leave it out");
         }
-        let Some(algorithm) = self.algorithm else {
-            let message = "the algorithm \"linearised\" is no more, its torque was not the gradient of its energy: take \
-                           geometry = \"rest\"";
-            return error("algorithm", message);
-        };
-        let algorithm = match self.geometry {
-            Some(_) if checker.has("contact.algorithm") => {
-                let message = "geometry says by which law contact is solved: leave algorithm out";
-                return error("algorithm", message);
-            }
-            Some(geometry) => geometry.into(),
-            None => algorithm,
+        let Some(law) = self.law else {
+            let message = "the law \"linearised\" is no more, its torque was not the gradient of its energy: take \
+                           law = \"rest\", or leave it out";
+            let key = LAW_KEYS.into_iter().find(|key| checker.has(&format!("contact.{key}")));
+            return error(key.unwrap_or("law"), message);
         };
         let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, mut surface, .. } = self;
         match (stiffness > 0.0, stiffness_per_length) {
@@ -210,19 +187,21 @@ impl ContactTable {
                 return error("stiffness", message);
             }
         }
-        match (surface, algorithm) {
-            (ContactSurface::Smooth, Algorithm::Paper) if checker.has("contact.surface") => {
-                let message = "the algorithm \"paper\" is defined on the triangles: leave out surface or algorithm";
+        match (surface, law) {
+            (ContactSurface::Smooth, ContactLaw::Paper) if checker.has("contact.surface") => {
+                let message = "the law \"paper\" is defined on the triangles: leave out surface or law";
                 return error("surface", message);
             }
-            (ContactSurface::Smooth, Algorithm::Paper) => surface = ContactSurface::Facets,
-            (ContactSurface::Facets, Algorithm::Energy | Algorithm::Rest) if nodes().any(|node| node.radius > 0.0) => {
+            (ContactSurface::Smooth, ContactLaw::Paper) => surface = ContactSurface::Facets,
+            (ContactSurface::Facets, ContactLaw::Following | ContactLaw::Rest)
+                if nodes().any(|node| node.radius > 0.0) =>
+            {
                 let message = "nodes with a radius do not balance where the closest triangle changes: leave surface \
                                out, and they touch the smooth surface";
                 return error("surface", message);
             }
             _ => {}
         }
-        Ok(ContactSpec { stiffness, stiffness_per_length, algorithm, tolerance, max_iterations, surface })
+        Ok(ContactSpec { stiffness, stiffness_per_length, law, tolerance, max_iterations, surface })
     }
 }

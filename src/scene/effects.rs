@@ -8,7 +8,7 @@ use toml::{Table, Value};
 /// An effect of a loop: absent unless the scene names it.
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
-    /// Table of the scene's file that it stands in, `haptics` or `graphics`.
+    /// Table of the scene's file that it stands in, `haptics`, `object` or `graphics`.
     pub table: &'static str,
     /// Its key there.
     pub key: &'static str,
@@ -46,17 +46,17 @@ pub const EFFECTS: [Effect; 9] = [
         table: "haptics",
         key: "friction",
         name: "Contact friction",
-        what: "Coulomb friction of elastic-plastic bristles at the proxy's nodes in contact: sticks, slips",
+        what: "Coulomb friction of the proxy on the object: sticks, gives a little, slides",
         usual: "{ coefficient = 0.4 }",
         copy: |to, from| to.haptics.friction = from.haptics.friction,
     },
     Effect {
-        table: "haptics",
-        key: "contact_damping",
-        name: "Contact damping",
-        what: "Dampers along the normals of the contacts",
-        usual: "1.0",
-        copy: |to, from| to.haptics.contact_damping = from.haptics.contact_damping,
+        table: "object",
+        key: "relaxation",
+        name: "Relaxation",
+        what: "The object's force fades while it is held, and its dent recovers",
+        usual: "{ terms = [[0.55, 0.05], [0.2, 0.5]] }",
+        copy: |to, from| to.haptics.relaxation.clone_from(&from.haptics.relaxation),
     },
     Effect {
         table: "haptics",
@@ -123,16 +123,10 @@ impl Effect {
         self.table == "graphics"
     }
 
-    /// Whether it acts on the proxy's nodes in contact, and so has the forces on them stored.
+    /// Whether it acts by what a dataset stores for it: contact forces on the object, or how contacts slip.
     #[must_use]
-    pub fn is_at_contacts(&self) -> bool {
-        matches!(self.key, "friction" | "contact_damping")
-    }
-
-    /// Whether it has contact forces stored, on the object's nodes or the proxy's.
-    #[must_use]
-    pub fn needs_forces(&self) -> bool {
-        self.is_drawn() || self.is_at_contacts()
+    pub fn is_stored(&self) -> bool {
+        self.is_drawn() || self.key == "friction"
     }
 
     /// Its value in `scene`; none where the scene does not name it, or says that it is off.
@@ -167,7 +161,7 @@ impl Effect {
         let plain = HapticsSpec {
             proxy_inertia: ProxyInertia::Constant,
             friction: None,
-            contact_damping: None,
+            relaxation: None,
             four_channel: None,
             passivity_control: false,
             ..tuning.haptics.clone()
@@ -223,7 +217,9 @@ mod tests {
     use super::*;
 
     fn sphere() -> Scene {
-        Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap()
+        let text = include_str!("../../tests/scenes/sphere.toml");
+        // Relaxation asks for it.
+        Scene::parse(&text.replace("\"linear\"", "\"potential\""), "sphere.toml").unwrap()
     }
 
     #[test]
@@ -267,15 +263,17 @@ mod tests {
 
     #[test]
     fn a_scene_keeps_its_own_values_and_what_is_off_takes_the_usual_one() {
-        let text = sphere()
-            .text
-            .replace("rate = 1000.0 ", "rate = 1000.0\npassivity_control = false\ncontact_damping = 7.5\n# ");
+        let text = sphere().text.replace(
+            "rate = 1000.0 ",
+            "rate = 1000.0\npassivity_control = false\nfriction = { coefficient = 7.5 }\n# ",
+        );
         let scene = Scene::parse(&text, "s.toml").unwrap();
         let value = |key: &str| EFFECTS.iter().find(|effect| effect.key == key).unwrap().value(&scene);
-        assert_eq!((value("contact_damping"), value("passivity_control")), (Value::Float(7.5), Value::Boolean(true)));
+        assert_eq!(value("friction").get("coefficient"), Some(&Value::Float(7.5)));
+        assert_eq!(value("passivity_control"), Value::Boolean(true));
         let named: Vec<&str> =
             EFFECTS.iter().filter(|effect| effect.is_named(&scene)).map(|effect| effect.key).collect();
-        assert_eq!(named, ["contact_damping"]);
+        assert_eq!(named, ["friction"]);
     }
 
     #[test]

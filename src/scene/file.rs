@@ -8,7 +8,7 @@ use super::object::ObjectTable;
 use super::proxy::ProxyTable;
 use super::scan::ScanTable;
 use super::{
-    Algorithm, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
+    ContactLaw, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
     SceneError, shape,
 };
 use crate::names;
@@ -56,18 +56,26 @@ pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result
         return Err(checker.error(0..0, message));
     };
     let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, &mut table)?;
-    if let Some(effect) = haptics.at_contacts() {
-        let message = format!("{effect} needs the contact forces, which a real object does not tell: leave it out");
-        return Err(checker.at(&format!("haptics.{effect}"), message));
+    if haptics.friction.is_some() {
+        let message = "friction needs to know how contacts slip, which a real object does not tell: leave it out";
+        return Err(checker.at("haptics.friction", message));
     }
     Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }
+
+/// Why a torque that is interpolated alone does not relax.
+pub const LINEAR_RELAXATION: &str = "relaxation acts on the root of the object's energy, of which interpolation = \"linear\" is not the gradient, and \
+     would give energy from nowhere: leave relaxation out, or set interpolation = \"potential\" in [haptics] for a \
+     virtual object";
 
 /// Validates what rendering needs of `table`, and takes it.
 pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result<Rendering, SceneError> {
     let proxy = table.proxy.check(checker)?;
     let joints = &proxy.joints;
-    let object = take(&mut table.object).map(|object| object.check(checker)).transpose()?;
+    let mut object = take(&mut table.object);
+    let relaxation = object.as_mut().and_then(|object| object.relaxation.take());
+    let relaxation = relaxation.map(|relaxation| relaxation.check(checker)).transpose()?;
+    let object = object.map(|object| object.check(checker)).transpose()?;
     // A virtual object is drawn unless the scene says no; a real one moves by no forces that are known.
     let graphics = match table.graphics {
         Some(GraphicsEntry::Loop(graphics)) => Some(graphics),
@@ -78,10 +86,14 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     let mut haptics = take(&mut table.haptics);
     // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
     // energy.
-    let solved = table.contact.as_ref().is_some_and(|contact| contact.algorithm != Some(Algorithm::Paper));
+    let solved = table.contact.as_ref().is_some_and(|contact| contact.law != Some(ContactLaw::Paper));
     if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
         haptics.interpolation = Interpolation::Linear;
     }
+    if relaxation.is_some() && !haptics.interpolation.is_potential() {
+        return Err(checker.at("object.relaxation", LINEAR_RELAXATION));
+    }
+    haptics.relaxation = relaxation;
     haptics.check(checker, joints)?;
     let (motion, device) = (take(&mut table.motion), take(&mut table.device));
     motion.check(checker, joints)?;

@@ -5,8 +5,8 @@
 
 use super::check::Checker;
 use super::gains::{GAINS, OF_THE_DEVICE, OF_THE_HAND};
-use super::value::{KEY, Range, defaults, gains, not_negative, positive, positive_gains, share};
-use super::{JointSpec, SceneError};
+use super::value::{KEY, Range, defaults, gains, positive, positive_gains, share};
+use super::{JointSpec, RelaxationSpec, SceneError};
 use crate::JointVector;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error};
@@ -78,11 +78,11 @@ pub struct HapticsSpec {
     /// Dry friction of each joint of the device; zero if not given (N m).
     #[serde(deserialize_with = "gains")]
     pub device_friction: JointVector,
-    /// Friction between the proxy and the object, where the scene names it, as each of the three effects below.
+    /// Friction between the proxy and the object, where the scene names it, as each of the two effects below.
     pub friction: Option<FrictionSpec>,
-    /// Dampers along the normals of the contacts: c of one contact (N s/m).
-    #[serde(deserialize_with = "positive")]
-    pub contact_damping: Option<f64>,
+    /// Memory of the object, which the scene names in its table.
+    #[serde(skip)]
+    pub relaxation: Option<RelaxationSpec>,
     /// Force channels beside the spring and damper of the virtual coupling.
     pub four_channel: Option<FourChannelSpec>,
     /// Whether a passivity controller acts when the passivity observer is negative.
@@ -91,7 +91,7 @@ pub struct HapticsSpec {
     pub hand: HandSpec,
 }
 
-/// Coulomb friction of elastic-plastic bristles, one at each proxy node in contact.
+/// Coulomb friction of an elastic-plastic spring between proxy and object.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionSpec {
@@ -101,12 +101,9 @@ pub struct FrictionSpec {
     /// Tangential over normal force at which sticking ends; at least `coefficient`, which it is where it is `None` (1).
     #[serde(deserialize_with = "positive", default)]
     pub static_coefficient: Option<f64>,
-    /// Stiffness of a bristle: how fast friction builds up while sticking (N/m).
-    #[serde(deserialize_with = "positive", default = "bristle_stiffness")]
+    /// Stiffness of the spring: how fast friction builds up while sticking (N/m).
+    #[serde(deserialize_with = "positive", default = "sticking_stiffness")]
     pub stiffness: f64,
-    /// Damping of a bristle while sticking (N s/m).
-    #[serde(deserialize_with = "not_negative", default = "bristle_damping")]
-    pub damping: f64,
 }
 
 /// Four-channel coupling (Lawrence 1993).
@@ -137,30 +134,21 @@ pub enum ProxyInertia {
 pub enum Interpolation {
     /// Multilinear torque behind the boundary of the contact index (section 3.1).
     Linear,
-    /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop.
+    /// Minus the gradient of a smoothly interpolated energy: makes no energy around any loop. Scenes of datasets that
+    /// were filled while they were felt named it `direct`.
+    #[serde(alias = "direct")]
     Potential,
-    /// The equilibrium at rest, solved in every tick, of a scene that is felt itself; in a dataset `potential`.
-    Direct,
 }
 
 impl Interpolation {
     /// All between the points of a grid, from the roughest on.
     pub const ALL: [Self; 2] = [Self::Linear, Self::Potential];
 
-    /// All that a scene may name.
-    pub const NAMED: [Self; 3] = [Self::Linear, Self::Potential, Self::Direct];
-
-    /// The one of [`Interpolation::ALL`] by which a dataset answers where the scene names this one.
-    #[must_use]
-    pub fn in_a_dataset(self) -> Self {
-        if self == Self::Direct { Self::Potential } else { self }
-    }
-
     /// Whether the torque is the gradient of an interpolated energy, which a dataset must hold; a boundary layer limits
     /// the others'.
     #[must_use]
     pub fn is_potential(self) -> bool {
-        self.in_a_dataset() == Self::Potential
+        self == Self::Potential
     }
 
     /// As the scene names it.
@@ -169,7 +157,6 @@ impl Interpolation {
         match self {
             Self::Linear => "linear",
             Self::Potential => "potential",
-            Self::Direct => "direct",
         }
     }
 }
@@ -197,11 +184,9 @@ const CHANNELS: [f64; 4] = [0.5, 1.0, 1.0, 0.5];
 const CHANNEL_FILTER: f64 = 0.005;
 
 defaults! {
-    /// Default stiffness of a bristle (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for
+    /// Default stiffness of friction (N/m): a friction of 1 N builds up over 2 mm, below what a fingertip takes for
     /// a slip.
-    bristle_stiffness: f64 = 500.0;
-    /// Default damping of a bristle (N s/m).
-    bristle_damping: f64 = 1.0;
+    sticking_stiffness: f64 = 500.0;
 }
 
 impl Default for HapticsSpec {
@@ -227,7 +212,7 @@ impl Default for HapticsSpec {
             encoder_step: unset,
             device_friction: unset,
             friction: None,
-            contact_damping: None,
+            relaxation: None,
             four_channel: None,
             passivity_control: false,
             hand: HandSpec::default(),
@@ -242,11 +227,10 @@ impl Default for FourChannelSpec {
 }
 
 impl HapticsSpec {
-    /// The key of the first effect that acts at contacts, and so needs their forces.
+    /// Whether the loop needs to know how contacts slip.
     #[must_use]
-    pub fn at_contacts(&self) -> Option<&'static str> {
-        let friction = self.friction.map(|_| "friction");
-        friction.or(self.contact_damping.map(|_| "contact_damping"))
+    pub fn uses_slip(&self) -> bool {
+        self.friction.is_some() || self.relaxation.as_ref().is_some_and(|relaxation| relaxation.dent.is_some())
     }
 
     /// Fits it to the arm's `joints`, and checks it.

@@ -19,17 +19,19 @@ mod motion;
 mod object;
 mod own_text;
 mod proxy;
+mod relaxation;
 mod scan;
 mod shape;
 mod skin;
 pub(crate) mod text;
 mod value;
 
-pub use contact::{Algorithm, ContactGeometry, ContactSpec, ContactSurface};
+pub use contact::{ContactLaw, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
 pub use error::{Diagnostic, SceneError};
+pub(crate) use file::LINEAR_RELAXATION;
 pub use gains::GainError;
 pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};
 pub use grid::{AxisSpec, GRID_LINE, GRID_STEP_SLACK, GridSpec};
@@ -43,6 +45,7 @@ pub use object::{
     SpringKind, SpringSpec,
 };
 pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
+pub use relaxation::{MOST_TERMS, RelaxationSpec};
 pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
 pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
 pub use skin::SkinSpec;
@@ -50,6 +53,7 @@ pub use skin::SkinSpec;
 pub(crate) use inertia::positive_semidefinite;
 
 use check::Checker;
+use clap::ValueEnum as _;
 use std::path::{Path, PathBuf};
 
 /// A whole scene, validated.
@@ -142,7 +146,7 @@ impl Scene {
     /// Whether the loop interpolates torque with its tangent d tau/d q, so that each equilibrium is to come with it.
     #[must_use]
     pub fn uses_tangent(&self) -> bool {
-        self.haptics.interpolation.is_potential() && self.contact.algorithm != Algorithm::Paper
+        self.haptics.interpolation.is_potential() && self.contact.law != ContactLaw::Paper
     }
 
     /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene
@@ -153,6 +157,20 @@ impl Scene {
     pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let checker = Checker { path: path.as_ref(), text };
         file::scene(&checker, checker.read()?)
+    }
+
+    /// The scene of a dataset: its `text`, with the law of contact by which the dataset says that it was solved.
+    ///
+    /// # Errors
+    /// When the scene is not valid, or the law is no more; the message names the remedy.
+    pub fn of_dataset(text: &str, path: impl AsRef<Path>, law: &str) -> Result<Self, SceneError> {
+        let mut scene = Self::parse(text, &path)?;
+        scene.contact.law = ContactLaw::from_str(law, true).map_err(|_| {
+            let message =
+                format!("it was solved by the law `{}`, which is no more: bake it anew", crate::names::escaped(law));
+            Checker { path: path.as_ref(), text }.at("contact", message)
+        })?;
+        Ok(scene)
     }
 }
 

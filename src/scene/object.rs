@@ -1,9 +1,9 @@
 //! `[object]`: shape, material, ground.
 
-use super::SceneError;
 use super::check::Checker;
 use super::skin::{SkinSpec, SkinTable};
 use super::value::{KEY, Range, count, defaults, finite, not_negative, positive, vector};
+use super::{RelaxationSpec, SceneError};
 use glam::DVec3;
 use serde::de::{Deserialize, Deserializer, Error};
 use std::path::PathBuf;
@@ -220,6 +220,8 @@ pub(super) struct ObjectTable {
     elasticity: Option<ElasticityTable>,
     skin: Option<SkinTable>,
     ground: Option<GroundTable>,
+    /// Of the haptic loop.
+    pub relaxation: Option<RelaxationSpec>,
     #[serde(default = "node_mass", deserialize_with = "positive")]
     node_mass: f64,
     #[serde(default = "node_damping", deserialize_with = "not_negative")]
@@ -339,7 +341,7 @@ fn grounded<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Vec<u32>>, D::
 impl ObjectTable {
     /// The object.
     pub fn check(self, checker: &Checker<'_>) -> Result<ObjectSpec, SceneError> {
-        let Self { sphere, mesh, tetrahedra, springs, elasticity, skin, ground, node_mass, node_damping } = self;
+        let Self { sphere, mesh, tetrahedra, springs, elasticity, skin, ground, node_mass, node_damping, .. } = self;
         let folder = checker.path.parent().unwrap_or(checker.path);
         let is_solid = tetrahedra.is_some();
         let shape = match (sphere, mesh, tetrahedra) {

@@ -1,11 +1,12 @@
 //! A scene's text brought to what the scene has become, so that a dataset's scene says what was baked.
 
-use super::{Algorithm, AxisSpec, Scene, SceneError};
+use super::contact::LAW_KEYS;
+use super::{AxisSpec, Scene, SceneError};
 use toml::{Table, Value};
 
 impl Scene {
-    /// The same scene with a text that gives its grid, its interpolation, and algorithm and tolerance of its contact as
-    /// they are now, whatever they were read as. Comments are lost.
+    /// The same scene with a text that gives its grid, its interpolation, and law and tolerance of its contact as they
+    /// are now, whatever they were read as. Comments are lost.
     ///
     /// # Errors
     /// When that makes no scene.
@@ -29,13 +30,11 @@ impl Scene {
         };
         set("haptics", "interpolation", self.haptics.interpolation.name().into());
         set("contact", "tolerance", self.contact.tolerance.into());
-        let (law, other) = match self.contact.algorithm {
-            Algorithm::Energy => (("geometry", "following"), "algorithm"),
-            Algorithm::Rest => (("geometry", "rest"), "algorithm"),
-            Algorithm::Paper => (("algorithm", "paper"), "geometry"),
-        };
-        set("contact", law.0, law.1.into());
-        text.get_mut("contact").and_then(Value::as_table_mut).and_then(|contact| contact.remove(other));
+        let law = self.contact.law.name().into();
+        if let Some(contact) = text.get_mut("contact").and_then(Value::as_table_mut) {
+            contact.retain(|key, _| !LAW_KEYS.contains(&key));
+            contact.insert(LAW_KEYS[0].into(), law);
+        }
         let Self { text, grid, haptics, contact, .. } = Self::parse(&text.to_string(), &self.path)?;
         Ok(Self { text, grid, haptics, contact, ..self.clone() })
     }
@@ -44,7 +43,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Interpolation;
+    use crate::scene::{ContactLaw, Interpolation};
 
     #[test]
     fn the_text_says_what_the_scene_has_become() {
@@ -55,8 +54,8 @@ mod tests {
         scene.contact.tolerance = 3e-5;
         scene.haptics.interpolation = Interpolation::Potential;
         // Paper's iteration feels the triangles.
-        for algorithm in [Algorithm::Rest, Algorithm::Energy] {
-            scene.contact.algorithm = algorithm;
+        for law in [ContactLaw::Rest, ContactLaw::Following] {
+            scene.contact.law = law;
             assert_eq!(scene.with_own_text().unwrap().contact, scene.contact);
         }
         let own = scene.with_own_text().unwrap();

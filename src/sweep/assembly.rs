@@ -25,17 +25,13 @@ pub(super) fn buffers() -> usize {
     dataset::BUFFER + rayon::current_num_threads() * dataset::PIECE_BUFFER
 }
 
-fn is_ends(array: Stored) -> bool {
-    [Stored::ContactOffsets, Stored::TouchOffsets].contains(&array)
-}
-
 /// The results of a sweep.
 pub(super) struct Results<'a> {
     table: &'a Table<'a>,
     points: usize,
     shape: Shape,
-    /// Contacts before each piece, and in all; the same of touches. Empty where they are not stored.
-    rows: [Vec<usize>; 2],
+    /// Contacts before each piece, and in all; empty where they are not stored.
+    before: Vec<usize>,
     /// When this becomes true putting them together ends soon, in an error.
     stop: &'a AtomicBool,
 }
@@ -43,14 +39,15 @@ pub(super) struct Results<'a> {
 impl<'a> Results<'a> {
     /// The results of all `points` points in `table`, as they go into a file of `shape`.
     pub fn new(table: &'a Table<'a>, points: usize, shape: Shape, stop: &'a AtomicBool) -> Self {
-        let mut results = Self { table, points, shape, rows: Default::default(), stop };
-        results.rows = [Stored::ContactOffsets, Stored::TouchOffsets]
-            .map(|ends| if shape.has(ends) { results.rows_before(ends) } else { Vec::new() });
+        let mut results = Self { table, points, shape, before: Vec::new(), stop };
+        if shape.with_forces {
+            results.before = results.contacts_before();
+        }
         results
     }
 
-    fn rows_before(&self, ends: Stored) -> Vec<usize> {
-        let rows = |piece| self.runs(piece).map(|(block, points)| block.rows(ends, points).len()).sum();
+    fn contacts_before(&self) -> Vec<usize> {
+        let rows = |piece| self.runs(piece).map(|(block, points)| block.rows(points).len()).sum();
         let counts: Vec<usize> = (0..self.points.div_ceil(PIECE)).into_par_iter().map(rows).collect();
         let mut before = vec![0];
         before.extend(counts.into_iter().scan(0, |sum, count| {
@@ -69,11 +66,6 @@ impl<'a> Results<'a> {
         self.shape.width().bytes(array)
     }
 
-    /// Contacts before each piece, or touches, whose ends are `ends`.
-    fn before(&self, ends: Stored) -> &[usize] {
-        &self.rows[usize::from(ends == Stored::TouchOffsets)]
-    }
-
     /// A column of all points, that of the ends of rows behind a 0, in memory; an error where there is none.
     pub fn column<T: Pod>(&self, array: Stored) -> Result<Vec<T>, TryReserveError> {
         let mut numbers = Vec::new();
@@ -90,9 +82,10 @@ impl<'a> Results<'a> {
 
     /// Bytes of a column in the file.
     fn bytes(&self, array: Stored) -> usize {
-        let entries = match array.ends() {
-            Some(ends) => self.before(ends).last().copied().unwrap_or(0),
-            None => self.points + usize::from(is_ends(array)),
+        let entries = match array {
+            _ if array.is_of_contacts() => self.before.last().copied().unwrap_or(0),
+            Stored::ContactOffsets => self.points + 1,
+            _ => self.points,
         };
         entries * self.size(array)
     }
@@ -101,7 +94,7 @@ impl<'a> Results<'a> {
     pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), dataset::Error> {
         let tensor =
             |array: Stored| Tensor::stored(array, heading.grid, self.bytes(array), Contents::Results(self, array));
-        let stored = RESULTS.into_iter().filter(|array| self.shape.has(array.ends().unwrap_or(*array)));
+        let stored = RESULTS.into_iter().filter(|array| self.shape.has(*array));
         let mut tensors: Vec<_> = stored.map(tensor).collect();
         tensors.extend(surface_tensors(heading.grid, surface).into_iter().map(|tensor| tensor.map(Contents::Held)));
         write_file(output, heading, tensors)
@@ -120,10 +113,10 @@ impl TensorContents for Contents<'_> {
             Self::Held(bytes) => bytes.pieces(),
             Self::Results(results, array) => {
                 let points = (0..results.points).step_by(PIECE);
-                let first: Vec<usize> = match array.ends() {
-                    Some(ends) => points.zip(results.before(ends)).map(|(_, &before)| before).collect(),
-                    None if is_ends(*array) => points.map(|point| point + usize::from(point > 0)).collect(),
-                    None => points.collect(),
+                let first: Vec<usize> = match *array {
+                    _ if array.is_of_contacts() => points.zip(&results.before).map(|(_, &before)| before).collect(),
+                    Stored::ContactOffsets => points.map(|point| point + usize::from(point > 0)).collect(),
+                    _ => points.collect(),
                 };
                 first.into_iter().map(|entry| entry * results.size(*array)).collect()
             }
@@ -135,7 +128,7 @@ impl TensorContents for Contents<'_> {
             Self::Held(bytes) => return bytes.write(piece, writer),
             Self::Results(results, array) => (results, *array),
         };
-        let mut end = is_ends(array).then(|| results.before(array)[piece] as u64);
+        let mut end = (array == Stored::ContactOffsets).then(|| results.before[piece] as u64);
         if let (Some(end), 0) = (end, piece) {
             writer.write_all(&end.to_le_bytes())?;
         }
@@ -148,7 +141,7 @@ impl TensorContents for Contents<'_> {
                 writer.write_all(bytes)?;
                 continue;
             };
-            let shift = before.wrapping_sub(block.rows(array, points).start as u64);
+            let shift = before.wrapping_sub(block.rows(points).start as u64);
             for bytes in bytes.as_chunks().0 {
                 let shifted = shift.wrapping_add(u64::from_le_bytes(*bytes));
                 writer.write_all(&shifted.to_le_bytes())?;

@@ -5,7 +5,7 @@ use crate::{
     JointVector,
     contact::Model,
     dataset::Dataset,
-    object::{Compliance, Object, ObjectError},
+    object::{Compliance, LatticeError, Object, ObjectError},
     proxy::Chain,
     scene::{AxisSpec, Scene},
 };
@@ -153,6 +153,8 @@ impl Bake<'_> {
             }
         }
         sweep.aim_at(aim);
+        let error = object.lattice_error(&scene.object, &model.compliance);
+        sweep.warnings.extend(error.filter(LatticeError::is_large).map(|error| error.to_string()));
         let run = Run { chunk: chosen.chunk(), stop, progress };
         work(&mut sweep, &mut chosen, run)
     }
@@ -162,6 +164,7 @@ impl Bake<'_> {
 pub(crate) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, ObjectError> {
     let mut model = Model::reaching(object, chain, scene.contact, &sample(scene))?;
     model.with_tangent = scene.uses_tangent();
+    model.with_slip = scene.haptics.uses_slip();
     Ok(model)
 }
 

@@ -6,7 +6,7 @@ use crate::{
     contact::{Equilibrium, Model, Work},
     gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver, asked_for, named_adapters},
     memory,
-    scene::Algorithm,
+    scene::ContactLaw,
 };
 
 /// Choices of a backend.
@@ -79,7 +79,7 @@ impl<'a> ChosenBackend<'a> {
         match choice {
             BackendChoice::Cpu => Self::cpu(model),
             // No GPU takes it, so that none needs to be opened.
-            BackendChoice::Auto if model.contact.algorithm != Algorithm::Rest => Self::cpu(model),
+            BackendChoice::Auto if model.contact.law != ContactLaw::Rest => Self::cpu(model),
             BackendChoice::Gpu => Ok(Self::gpu(AdapterChoice::Any, model)?),
             BackendChoice::Auto => match Self::gpu(AdapterChoice::Hardware, model) {
                 // Who names an adapter that is not there would not notice that the CPU took its place.

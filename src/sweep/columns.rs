@@ -2,8 +2,8 @@
 
 use super::table::PointResult;
 use crate::contact::{Equilibrium, NodeForce, Status};
-use crate::dataset::{Axes, CONTACTS, RESULTS, Stored, TOUCHES};
-use crate::joint_matrix;
+use crate::dataset::{Axes, CONTACTS, RESULTS, Stored};
+use crate::joint_matrix::{self, JointMatrix};
 use bytemuck::NoUninit;
 use std::collections::BTreeMap;
 
@@ -14,26 +14,26 @@ pub(super) struct Shape {
     pub surface_nodes: usize,
     /// Whether contact forces on the object's nodes are stored.
     pub with_forces: bool,
-    /// Whether those on the proxy's nodes are.
-    pub with_touches: bool,
     /// Whether tangents are stored.
     pub with_tangent: bool,
+    /// Whether slips are stored.
+    pub with_slip: bool,
 }
 
 impl Shape {
-    /// Whether a column is stored; of rows, their ends say so.
+    /// Whether a column is stored.
     pub fn has(self, array: Stored) -> bool {
         match array {
             Stored::Tangent => self.with_tangent,
-            Stored::ContactOffsets => self.with_forces,
-            Stored::TouchOffsets => self.with_touches,
+            Stored::NormalForce | Stored::SlipJacobian => self.with_slip,
+            Stored::ContactOffsets | Stored::ContactNodes | Stored::ContactForces => self.with_forces,
             _ => true,
         }
     }
 
     /// Returns the number of entries in each column of fixed width.
     pub fn width(self) -> Width {
-        Width { joints: self.joints, tangent: self.with_tangent, touches: self.with_touches }
+        Width { joints: self.joints, tangent: self.with_tangent, slip: self.with_slip }
     }
 }
 
@@ -44,20 +44,26 @@ pub(super) struct Width {
     pub joints: usize,
     /// Whether tangents are stored.
     pub tangent: bool,
-    /// Whether touches are stored.
-    pub touches: bool,
+    /// Whether slips are stored.
+    pub slip: bool,
 }
 
 impl Width {
-    /// Numbers of an entry of a column: of a point, a contact or a touch. 0 where it is not stored.
+    /// Numbers of an entry of a column, of a point or a contact. 0 where it is not stored.
     pub fn numbers(self, array: Stored) -> usize {
         match array.description().axes {
             Axes::Joints(_) => self.joints,
-            Axes::Triangle(_) => usize::from(self.tangent) * joint_matrix::entries(self.joints),
+            Axes::Triangle(_) if array == Stored::Tangent => usize::from(self.tangent) * self.entries(),
+            Axes::Triangle(_) => usize::from(self.slip) * self.entries(),
+            Axes::Grid if array == Stored::NormalForce => self.slip.into(),
             Axes::Grid => 1,
-            Axes::Own(_) if array == Stored::TouchOffsets => self.touches.into(),
             Axes::Own(axes) => axes.iter().skip(1).map(|(_, length)| length).product(),
         }
+    }
+
+    /// Entries of a symmetric matrix over the joints.
+    fn entries(self) -> usize {
+        joint_matrix::entries(self.joints)
     }
 
     /// Bytes of an entry of a column.
@@ -77,19 +83,15 @@ pub(super) struct Columns([Vec<u8>; COLUMNS]);
 /// New results of single points, by number of the grid point: columns of one point each.
 pub(super) type Replaced = BTreeMap<usize, Columns>;
 
-/// Bytes of the columns of `points` points of `width` with `contacts` and `touches` in all.
-pub(super) fn size(points: usize, width: Width, contacts: usize, touches: usize) -> usize {
-    lengths(points, width, contacts, touches).into_iter().fold(0, usize::saturating_add)
+/// Bytes of the columns of `points` points of `width` with `contacts` in all.
+pub(super) fn size(points: usize, width: Width, contacts: usize) -> usize {
+    lengths(points, width, contacts).into_iter().fold(0, usize::saturating_add)
 }
 
 /// The same, column by column.
-pub(super) fn lengths(points: usize, width: Width, contacts: usize, touches: usize) -> [usize; COLUMNS] {
+pub(super) fn lengths(points: usize, width: Width, contacts: usize) -> [usize; COLUMNS] {
     RESULTS.map(|array| {
-        let entries = match array.ends() {
-            None => points,
-            Some(Stored::ContactOffsets) => contacts,
-            Some(_) => touches,
-        };
+        let entries = if array.is_of_contacts() { contacts } else { points };
         entries.saturating_mul(width.bytes(array))
     })
 }
@@ -108,10 +110,9 @@ impl Columns {
     /// Adds the equilibrium of the next point.
     ///
     /// A result that no file may hold (a number that is not finite, torques of another chain, nodes that the surface
-    /// does not have or out of order) becomes an unconverged point without torque and forces, of residual 1: the empty
+    /// does not have or out of order, a slip that is asked for and not there) becomes an unconverged point without torque and forces, of residual 1: the empty
     /// answer, which balances nothing.
     pub fn push(&mut self, equilibrium: &Equilibrium, shape: Shape) {
-        let on_proxy = if shape.with_touches { equilibrium.on_proxy() } else { Vec::new() };
         let on_object = if shape.with_forces { &equilibrium.forces[..] } else { &[] };
         let result = PointResult::of(equilibrium);
         let are_sound = |forces: &[NodeForce]| {
@@ -124,44 +125,56 @@ impl Columns {
             && result.residual.is_finite()
             && are_sound(&equilibrium.forces)
             && equilibrium.forces.last().is_none_or(|last| (last.node as usize) < shape.surface_nodes)
-            && are_sound(&on_proxy);
+            && equilibrium.slip.map_or(!shape.with_slip || equilibrium.touches.is_empty(), |slip| slip.is_finite());
         if !is_sound {
             let gap = if result.gap.is_finite() { result.gap } else { 0.0 };
             let empty =
                 PointResult { status: Status::Unconverged, residual: 1.0, ..PointResult::free(shape.joints, gap) };
-            return self.add_point(&PointResult { iterations: result.iterations, ..empty }, &[], [&[], &[]], shape);
+            let empty = PointResult { iterations: result.iterations, ..empty };
+            return self.add_point(&empty, [None, None], 0.0, &[], shape);
         }
         let tangent =
             equilibrium.tangent.filter(|tangent| tangent.as_flattened().iter().all(|entry| entry.is_finite()));
-        let tangent: Vec<f32> = tangent
-            .iter()
-            .flat_map(|tangent| joint_matrix::lower(tangent, shape.joints))
-            .map(|entry| entry as f32)
-            .collect();
-        self.add_point(&result, &tangent, [on_object, &on_proxy], shape);
+        let slip = equilibrium.slip.unwrap_or_default();
+        self.add_point(&result, [tangent, Some(slip.jacobian)], slip.normal_force, on_object, shape);
     }
 
     /// Adds a point at which nothing touches and nothing was solved, with a lower bound of its gap (m).
     pub fn push_free(&mut self, gap: f32, shape: Shape) {
-        self.add_point(&PointResult::free(shape.joints, gap), &[], [&[], &[]], shape);
+        self.add_point(&PointResult::free(shape.joints, gap), [None, None], 0.0, &[], shape);
     }
 
-    /// Adds a point with the lower triangle of its `tangent`, zeros where there is none, and the forces on the object's
-    /// nodes and on the proxy's.
-    fn add_point(&mut self, result: &PointResult, tangent: &[f32], forces: [&[NodeForce]; 2], shape: Shape) {
+    /// Adds a point with its tangent and its slip Jacobian, zeros where there is none, its normal force and the forces
+    /// on the object's nodes.
+    fn add_point(
+        &mut self,
+        result: &PointResult,
+        [tangent, slip_jacobian]: [Option<JointMatrix>; 2],
+        normal_force: f64,
+        forces: &[NodeForce],
+        shape: Shape,
+    ) {
         self.add(Stored::Torque, &result.torque);
         self.add(Stored::Energy, &[result.energy]);
-        let zeros = vec![0.0_f32; shape.width().numbers(Stored::Tangent)];
-        self.add(Stored::Tangent, if tangent.is_empty() { &zeros } else { tangent });
+        if shape.with_tangent {
+            self.add_triangle(Stored::Tangent, tangent, shape);
+        }
+        if shape.with_slip {
+            self.add(Stored::NormalForce, &[normal_force as f32]);
+            self.add_triangle(Stored::SlipJacobian, slip_jacobian, shape);
+        }
         self.add(Stored::Gap, &[result.gap]);
         self.add(Stored::Status, &[result.status as u8]);
         self.add(Stored::Residual, &[result.residual]);
         self.add(Stored::Iterations, &[result.iterations]);
-        let [on_object, on_proxy] = forces;
-        self.add_row(CONTACTS, on_object);
-        if shape.with_touches {
-            self.add_row(TOUCHES, on_proxy);
-        }
+        self.add_row(CONTACTS, forces);
+    }
+
+    /// Adds the lower triangle of a matrix over the joints, zeros where there is none.
+    fn add_triangle(&mut self, array: Stored, matrix: Option<JointMatrix>, shape: Shape) {
+        let matrix = matrix.unwrap_or_default();
+        let entries: Vec<f32> = joint_matrix::lower(&matrix, shape.joints).map(|entry| entry as f32).collect();
+        self.add(array, &entries);
     }
 
     /// Adds numbers to a column.

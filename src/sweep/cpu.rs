@@ -61,7 +61,7 @@ impl<'a> CpuBackend<'a> {
     pub fn provenance(scene: &Scene) -> Provenance {
         Provenance {
             version: env!("CARGO_PKG_VERSION").into(),
-            algorithm: scene.contact.algorithm.name().into(),
+            algorithm: scene.contact.law.name().into(),
             tolerance: scene.contact.tolerance,
             backend: "cpu".into(),
             adapter: Self::adapter(),
@@ -226,8 +226,8 @@ mod tests {
     fn provenance_names_the_algorithm_of_the_scene() {
         use clap::ValueEnum;
         let mut scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
-        for algorithm in crate::scene::Algorithm::value_variants() {
-            scene.contact.algorithm = *algorithm;
+        for algorithm in crate::scene::ContactLaw::value_variants() {
+            scene.contact.law = *algorithm;
             let named = algorithm.to_possible_value().unwrap();
             assert_eq!(CpuBackend::provenance(&scene).algorithm, named.get_name());
         }

@@ -39,8 +39,7 @@ impl Bounds {
 /// Results of `points` points at each of which `touching` nodes of the proxy touch (bytes).
 pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
     let contacts = if shape.with_forces { node_forces(touching, shape) } else { 0 };
-    let touches = touching * usize::from(shape.with_touches);
-    columns::size(points, shape.width(), points.saturating_mul(contacts), points.saturating_mul(touches))
+    columns::size(points, shape.width(), points.saturating_mul(contacts))
 }
 
 /// Chunks on their way: `solved` configurations of each and their equilibria, and the columns of `points` points, and
@@ -50,8 +49,7 @@ pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape)
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());
     let each = size_of::<JointVector>() + size_of::<Equilibrium>() + lists;
     let contacts = if shape.with_forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
-    let touches = 2 * solved.saturating_mul(touching * usize::from(shape.with_touches));
-    let kept = columns::size(points, shape.width(), contacts, touches);
+    let kept = columns::size(points, shape.width(), contacts);
     let under_way = solved.saturating_mul(each).saturating_add(points.saturating_mul(size_of::<Option<f32>>()));
     under_way.saturating_mul(CHUNKS_IN_FLIGHT).saturating_add(kept.saturating_mul(1 + BEHIND))
 }

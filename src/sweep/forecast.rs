@@ -77,7 +77,7 @@ impl Sweep<'_> {
         let most = DRAWN.min(points);
         let free_space = self.free_space();
         let mut free_space = free_space.as_ref().map(|free_space| (free_space, free_space.proximity()));
-        let (mut sampled, mut touching, mut contacts, mut touches) = (0, 0, 0, 0);
+        let (mut sampled, mut touching, mut contacts) = (0, 0, 0);
         let (mut solving, start) = (0.0, Instant::now());
         for _ in 0..PORTIONS {
             let mut portion = Vec::new();
@@ -97,16 +97,14 @@ impl Sweep<'_> {
             for equilibrium in backend.solve(&portion)? {
                 touching += usize::from(equilibrium.status.is_in_contact());
                 contacts += equilibrium.forces.len();
-                touches += equilibrium.touches.len();
             }
             solving += begin.elapsed().as_secs_f64();
         }
         let per_sample = points as f64 / sampled.max(1) as f64;
         let seconds = per_sample * solving;
         let bytes = |shape: Shape| {
-            let [contacts, touches] = [(contacts, shape.with_forces), (touches, shape.with_touches)]
-                .map(|(rows, is_stored)| if is_stored { (per_sample * rows as f64).round() as usize } else { 0 });
-            columns::size(points, shape.width(), contacts, touches)
+            let contacts = if shape.with_forces { (per_sample * contacts as f64).round() as usize } else { 0 };
+            columns::size(points, shape.width(), contacts)
         };
         Ok(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,

@@ -18,9 +18,7 @@ use super::{
 };
 use crate::{
     contact::{MeshRipple, Model},
-    dataset::{
-        self, Axis, CONTACTS, Claim, Contacts, Dataset, Grid, Heading, Provenance, Stored, Surface, TOUCHES, Target,
-    },
+    dataset::{self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target},
     memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
@@ -127,8 +125,8 @@ impl<'a> Sweep<'a> {
                 joints: grid.joints(),
                 surface_nodes: object.surface_nodes,
                 with_forces,
-                with_touches: scene.haptics.at_contacts().is_some(),
                 with_tangent: false,
+                with_slip: scene.haptics.uses_slip(),
             },
             with_forces,
             grid,
@@ -139,7 +137,7 @@ impl<'a> Sweep<'a> {
             scene_path: std::path::absolute(&scene.path).unwrap_or_default().to_string_lossy().into_owned(),
             provenance: Provenance {
                 version: env!("CARGO_PKG_VERSION").into(),
-                algorithm: scene.contact.algorithm.name().into(),
+                algorithm: scene.contact.law.name().into(),
                 tolerance: scene.contact.tolerance,
                 backend: backend.into(),
                 adapter: adapter.into(),
@@ -180,12 +178,12 @@ impl<'a> Sweep<'a> {
     }
 
     /// Replaces equilibria by lower ones that are reached from those of neighbouring points, where the scene's
-    /// algorithm minimises the energy: U then has no jumps. `model` is that of the scene.
+    /// law minimises the energy: U then has no jumps. `model` is that of the scene.
     ///
     /// # Errors
     /// [`SweepError::Grid`] when the model's proxy has other joints.
     pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
-        if lowest::applies(model.contact.algorithm) {
+        if lowest::applies(model.contact.law) {
             self.lowest = Some(self.fitting(model)?);
             self.shape.with_forces = true;
         }
@@ -209,7 +207,7 @@ impl<'a> Sweep<'a> {
         if let Some(asked) = configurations.filter(|asked| *asked > MOST_CONFIGURATIONS) {
             return Err(SweepError::Configurations { asked });
         }
-        let interpolation = haptics.interpolation.in_a_dataset();
+        let interpolation = haptics.interpolation;
         self.error = Some(ErrorCheck { model, threshold, slope, interpolation, configurations, lowest });
         Ok(())
     }
@@ -370,7 +368,7 @@ impl<'a> Sweep<'a> {
             scene_path: self.scene_path.clone(),
             object: self.object,
             with_tangent: self.shape.with_tangent,
-            with_touches: self.shape.with_touches,
+            with_slip: self.shape.with_slip,
             provenance: self.provenance.clone(),
         }
     }
@@ -427,11 +425,17 @@ impl<'a> Sweep<'a> {
     }
 
     fn dataset(&self, results: &Results<'_>, provenance: Provenance) -> Result<Dataset, TryReserveError> {
-        let contacts = |[offsets, nodes, forces]: [Stored; 3]| -> Result<Contacts, TryReserveError> {
+        let contacts = || -> Result<Contacts, TryReserveError> {
             Ok(Contacts {
-                offsets: results.column(offsets)?.into(),
-                nodes: results.column(nodes)?.into(),
-                forces: results.column(forces)?.into(),
+                offsets: results.column(Stored::ContactOffsets)?.into(),
+                nodes: results.column(Stored::ContactNodes)?.into(),
+                forces: results.column(Stored::ContactForces)?.into(),
+            })
+        };
+        let slip = || -> Result<SlipColumns, TryReserveError> {
+            Ok(SlipColumns {
+                normal_force: results.column(Stored::NormalForce)?.into(),
+                jacobian: results.column(Stored::SlipJacobian)?.into(),
             })
         };
         Ok(Dataset {
@@ -443,8 +447,8 @@ impl<'a> Sweep<'a> {
             status: results.column(Stored::Status)?.into(),
             residual: Some(results.column(Stored::Residual)?.into()),
             iterations: Some(results.column(Stored::Iterations)?.into()),
-            contacts: self.with_forces.then(|| contacts(CONTACTS)).transpose()?,
-            touches: self.shape.with_touches.then(|| contacts(TOUCHES)).transpose()?,
+            contacts: self.with_forces.then(contacts).transpose()?,
+            slip: self.shape.with_slip.then(slip).transpose()?,
             surface: Some(self.surface.clone()),
             refinement: None,
             scene: self.scene.clone(),

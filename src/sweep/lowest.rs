@@ -28,7 +28,7 @@ use crate::{
     JointVector,
     contact::{Equilibrium, Model, NodeForce, Solver, Solvers, Status},
     dataset::Grid,
-    scene::Algorithm,
+    scene::ContactLaw,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -112,10 +112,10 @@ struct UniformGrid<'a, 't> {
     shape: Shape,
 }
 
-/// Whether `scene`s of this algorithm have several equilibria of which the lowest counts: the paper's steps define its
+/// Whether scenes of this `law` have several equilibria of which the lowest counts: the paper's steps define its
 /// result, and contact with the geometry at rest has one equilibrium.
-pub(super) fn applies(algorithm: Algorithm) -> bool {
-    algorithm == Algorithm::Energy
+pub(super) fn applies(law: ContactLaw) -> bool {
+    law == ContactLaw::Following
 }
 
 /// Replaces equilibria in `table` by lower ones. `None` when it was stopped.
@@ -316,7 +316,7 @@ mod tests {
     use crate::{dataset::Stored, field::synthetic, sweep::table::Block};
 
     const SHAPE: Shape =
-        Shape { joints: 1, surface_nodes: 9, with_forces: true, with_touches: false, with_tangent: false };
+        Shape { joints: 1, surface_nodes: 9, with_forces: true, with_tangent: false, with_slip: false };
 
     /// An equilibrium in contact with as many node forces as its energy has joules.
     fn equilibrium(energy: f64, torque: f64) -> Equilibrium {
@@ -330,6 +330,7 @@ mod tests {
             tangent: None,
             torque: JointVector::from_slice(&[torque]),
             forces: (0..energy as u32).map(force).collect(),
+            slip: None,
             touches: Vec::new(),
         }
     }

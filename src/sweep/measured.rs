@@ -23,7 +23,7 @@ use crate::{
     dataset::{Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
     field::{FieldError, TorqueField},
     random::Random,
-    scene::{Algorithm, ContactSpec, EffortNorm, Interpolation},
+    scene::{ContactLaw, ContactSpec, EffortNorm, Interpolation},
 };
 use rayon::prelude::*;
 use std::{
@@ -130,6 +130,7 @@ impl ErrorCheck<'_> {
         });
         let mut error = reference.measured(self.interpolation, errors.collect::<Result<_, FieldError>>()?);
         error.geometry = self.geometry_error(&reference);
+        error.friction = reference.friction_excess(self.model);
         let cells = places.par_iter().map(|place| {
             let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
             (place.q, corners.collect())
@@ -140,11 +141,11 @@ impl ErrorCheck<'_> {
     /// Returns what contact at rest, of which `reference` has the torques, leaves out; none by another law.
     fn geometry_error(&self, reference: &Reference) -> Option<GeometryError> {
         let contact = self.model.contact;
-        if contact.algorithm != Algorithm::Rest {
+        if contact.law != ContactLaw::Rest {
             return None;
         }
-        let mut following = self.model.with_contact(ContactSpec { algorithm: Algorithm::Energy, ..contact });
-        following.with_tangent = false;
+        let mut following = self.model.with_contact(ContactSpec { law: ContactLaw::Following, ..contact });
+        (following.with_tangent, following.with_slip) = (false, false);
         let solvers = Solvers::new(&following, rayon::current_num_threads());
         let solved = solvers.map(&reference.places, |solver, q| solver.solve(q));
         let mut torques = solved.iter().map(|found| found.torque);
@@ -310,7 +311,7 @@ mod tests {
     };
 
     const SHAPE: Shape =
-        Shape { joints: 2, surface_nodes: 0, with_forces: false, with_touches: false, with_tangent: false };
+        Shape { joints: 2, surface_nodes: 0, with_forces: false, with_tangent: false, with_slip: false };
 
     /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
     fn columns(grid: &Grid) -> Columns {
@@ -332,6 +333,7 @@ mod tests {
                         -0.2 * depth * depth * q[1].cos(),
                     ]),
                     forces: Vec::new(),
+                    slip: None,
                     touches: Vec::new(),
                 },
                 SHAPE,

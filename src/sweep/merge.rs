@@ -19,9 +19,8 @@ use crate::{
     input,
     object::ObjectError,
     proxy::Chain,
-    scene::{Algorithm, Scene, SceneError},
+    scene::{Scene, SceneError},
 };
-use clap::ValueEnum;
 use memmap2::Mmap;
 use std::{
     collections::BTreeMap,
@@ -236,10 +235,7 @@ impl Merge {
         let mut binding = first.binding().clone();
         let dates = self.shards.values().map(|shard| shard.binding().provenance.date.clone());
         binding.provenance.date = dates.min().unwrap_or_default();
-        let mut scene = Scene::parse(&binding.scene, &binding.scene_path)?;
-        if let Ok(algorithm) = Algorithm::from_str(&binding.provenance.algorithm, true) {
-            scene.contact.algorithm = algorithm;
-        }
+        let scene = Scene::of_dataset(&binding.scene, &binding.scene_path, &binding.provenance.algorithm)?;
         let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
         let model = model_of(&scene, &object, &chain)?;
         let by = [&binding.provenance.backend, &binding.provenance.adapter, &binding.provenance.date];

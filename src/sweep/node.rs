@@ -22,10 +22,10 @@ use crate::{
     contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
     field::{GRADIENT_STEP, LEAST_ENERGY},
     joint_matrix,
-    scene::{Algorithm, Scene},
+    scene::{ContactLaw, Scene},
     store::{
         Space,
-        record::{mixed, slope, width},
+        record::{mixed, slip_of, slope, width},
         root_of,
     },
 };
@@ -45,26 +45,29 @@ const FARTHEST: f64 = 2.0;
 /// Most Newton steps to the boundary: the gap is nearly linear, and each step squares the error.
 const STEPS: usize = 6;
 
-/// The scene's algorithm gives no energy with a tangent.
+/// The scene's law of contact gives no energy with a tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the scene's algorithm is \"paper\", and nodes that refine a grid need the energy of contact with its tangent: leave \
-     algorithm out of [contact], or bake the grid alone"
+    "the scene's law of contact is \"paper\", and nodes that refine a grid need the energy of contact with its tangent: leave \
+     law out of [contact], or bake the grid alone"
 )]
 pub struct NoEnergy;
 
 /// Checks that nodes can be solved of `scene`.
 ///
 /// # Errors
-/// [`NoEnergy`] where its algorithm is [`Algorithm::Paper`].
-pub fn check_algorithm(scene: &Scene) -> Result<(), NoEnergy> {
-    if scene.contact.algorithm == Algorithm::Paper { Err(NoEnergy) } else { Ok(()) }
+/// [`NoEnergy`] where its law is [`ContactLaw::Paper`].
+pub fn check_law(scene: &Scene) -> Result<(), NoEnergy> {
+    if scene.contact.law == ContactLaw::Paper { Err(NoEnergy) } else { Ok(()) }
 }
 
 /// A solved node.
 pub(super) struct Solved {
     /// w, gradient, mixed derivatives; see [`crate::store::record`].
     pub record: Vec<f32>,
+    /// Slip of its contacts, or of those behind its boundary, as [`slip_of`] has it; zeros where none is known, and empty
+    /// where none is asked for.
+    pub slip: Vec<f32>,
     /// Equilibrium at the node.
     pub result: PointResult,
     /// Equilibria that were solved in contact for it: none where nothing is near, two at most.
@@ -79,6 +82,8 @@ pub(super) struct Scale {
     reach: f64,
     /// Contact stiffness (N/m).
     kc: f64,
+    /// Whether nodes say how contacts slip.
+    with_slips: bool,
 }
 
 impl Scale {
@@ -92,7 +97,7 @@ impl Scale {
         let bounds = model.chain.jacobian_bounds(&ranges);
         let reaches = bounds.iter().map(|bound| bound.iter().zip(&steps).map(|(lever, step)| lever * step).sum());
         let reach = reaches.fold(0.0, f64::max);
-        Self { steps, reach, kc: model.kc }
+        Self { steps, reach, kc: model.kc, with_slips: model.with_slip }
     }
 }
 
@@ -209,6 +214,7 @@ impl Begun {
     /// Returns the node at `q`, which holds `here`, with the equilibrium `behind` its boundary.
     fn conclude(self, q: &JointVector, here: &Equilibrium, behind: Option<&Equilibrium>, scale: &Scale) -> Solved {
         let Self { mut record, behind: at } = self;
+        let mut touching = here;
         if let (Some(at), Some(behind)) = (at, behind)
             && behind.status == Status::Contact
             && behind.energy > LEAST_ENERGY
@@ -216,15 +222,23 @@ impl Begun {
             let mut root = root_of(behind.energy, &behind.torque, None);
             root[0] += (0..q.len()).map(|a| root[slope(a)] * (q[a] - at[a])).sum::<f64>();
             if root[0] <= 0.0 {
-                record = root;
+                (record, touching) = (root, behind);
             }
         }
+        let slip = if scale.with_slips { slip_record(touching, q.len()) } else { Vec::new() };
         Solved {
+            slip: slip.into_iter().map(|number| number as f32).collect(),
             record: limited(record, &scale.steps).into_iter().map(|number| number as f32).collect(),
             result: PointResult::of(here),
             equilibria: u32::from(here.status.is_in_contact()) + u32::from(behind.is_some()),
         }
     }
+}
+
+/// How the contacts of an equilibrium slip; zeros where none is known.
+fn slip_record(equilibrium: &Equilibrium, joints: usize) -> Vec<f64> {
+    let slip = equilibrium.slip.filter(|slip| equilibrium.energy > LEAST_ENERGY && slip.is_finite());
+    slip.map_or(vec![0.0; width(joints)], |slip| slip_of(&slip, (2.0 * equilibrium.energy).sqrt(), joints))
 }
 
 /// The numbers of a node with mixed derivatives that change no slope by more than the largest, over a cell of the base.

@@ -1,7 +1,7 @@
 //! The part: an unfinished sweep on disk, so that killing the process loses one chunk at most.
 //!
 //! ```text
-//! "haptize part 5\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
+//! "haptize part 6\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
 //! The first body is the [`Binding`] as JSON, every other one a [`Block`] of results, or [`NOTICE`] and a text. Frames
@@ -26,7 +26,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-const MAGIC: &[u8] = b"haptize part 5\n";
+const MAGIC: &[u8] = b"haptize part 6\n";
 /// How the body of a notice begins: as no block of columns does, whose first point has no such number.
 const NOTICE: [u8; 8] = [u8::MAX; 8];
 
@@ -44,8 +44,8 @@ pub(super) struct Binding {
     pub object: u32,
     /// Whether tangents are stored.
     pub with_tangent: bool,
-    /// Whether contact forces on the proxy are stored.
-    pub with_touches: bool,
+    /// Whether slips are stored.
+    pub with_slip: bool,
     pub provenance: Provenance,
 }
 
@@ -68,7 +68,7 @@ impl Binding {
 
     /// Numbers that each point has.
     pub fn width(&self) -> Width {
-        Width { joints: self.grid.joints(), tangent: self.with_tangent, touches: self.with_touches }
+        Width { joints: self.grid.joints(), tangent: self.with_tangent, slip: self.with_slip }
     }
 
     /// Returns the first difference from `other` that forbids to continue it; the date may differ.
@@ -95,7 +95,7 @@ impl Binding {
             ("another text of the scene", self.scene != other.scene),
             ("another object, such as a mesh that changed meanwhile", self.object != other.object),
             ("another interpolation, for which tangents are stored or not", self.with_tangent != other.with_tangent),
-            ("other effects, for which contact forces are stored or not", self.with_touches != other.with_touches),
+            ("friction, for which slips are stored or not", self.with_slip != other.with_slip),
         ];
         differences.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
     }

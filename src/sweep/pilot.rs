@@ -327,16 +327,14 @@ impl Pilot {
     /// # Errors
     /// [`PilotError::OutOfReach`] where there are none; it says what the pilot measured, and what would help.
     pub fn choose(&self, scene: &Scene, limit: usize, backend: BackendChoice) -> Result<Choice, PilotError> {
-        // What is solved beside the loop is no matter of the grid, and stays.
-        let stays = scene.haptics.interpolation == Interpolation::Direct;
-        let best = if stays { own(&self.prospects, scene) } else { self.prospects.first() };
         let within = |best: &&Prospect| best.points <= limit as f64 && best.finer <= FARTHEST_EXTRAPOLATION;
+        let best = self.prospects.first();
         let Some(best) = best.filter(within) else {
             return Err(PilotError::OutOfReach(self.refused(best, limit)));
         };
         let mut chosen = self.spaced(scene, best.finer);
         chosen.contact.tolerance = self.tolerance;
-        let interpolation = Interpolation::ALL.into_iter().find(|i| i.name() == best.interpolation && !stays);
+        let interpolation = Interpolation::ALL.into_iter().find(|i| i.name() == best.interpolation);
         chosen.haptics.interpolation = interpolation.unwrap_or(scene.haptics.interpolation);
         let chosen = chosen.with_own_text()?;
         let points = spacing::points(&chosen);
@@ -389,7 +387,7 @@ impl Pilot {
 
 /// The prospect of the interpolation of `scene`.
 fn own<'a>(prospects: &'a [Prospect], scene: &Scene) -> Option<&'a Prospect> {
-    let own = scene.haptics.interpolation.in_a_dataset().name();
+    let own = scene.haptics.interpolation.name();
     prospects.iter().find(|prospect| prospect.interpolation == own)
 }
 

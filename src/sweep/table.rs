@@ -2,7 +2,7 @@
 //! lie in blocks.
 //!
 //! ```text
-//! u64 first point, u64 points, u64 contacts of the object's nodes, u64 touches of the proxy's
+//! u64 first point, u64 points, u64 contacts of the object's nodes
 //! the columns, in the order of `RESULTS`; those of offsets hold the end of each point's row within the block
 //! ```
 
@@ -25,7 +25,7 @@ pub(super) struct Table<'a> {
 }
 
 /// Numbers before the columns of a block.
-const OPENING: usize = 4;
+const OPENING: usize = 3;
 
 /// Columns of consecutive points as bytes, by [`Stored`]; they need not be aligned.
 #[derive(Clone, Copy)]
@@ -76,26 +76,25 @@ impl<'a> Block<'a> {
         let numbers: [[u8; 8]; OPENING] = bytemuck::cast(*opening);
         let mut numbers = numbers.into_iter().map(|number| usize::try_from(u64::from_le_bytes(number)).ok());
         let mut next = || numbers.next().flatten();
-        let (first, points, contacts, touches) = (next()?, next()?, next()?, next()?);
+        let (first, points, contacts) = (next()?, next()?, next()?);
         let mut columns = [&[][..]; COLUMNS];
-        for (column, length) in columns.iter_mut().zip(lengths(points, width, contacts, touches)) {
+        for (column, length) in columns.iter_mut().zip(lengths(points, width, contacts)) {
             (*column, rest) = rest.split_at_checked(length)?;
         }
         let block = Self { first, columns };
-        let rows = [(Stored::ContactOffsets, contacts), (Stored::TouchOffsets, touches)];
-        (rest.is_empty() && rows.into_iter().all(|(ends, count)| block.rows_fit(ends, count))).then_some(block)
+        (rest.is_empty() && block.rows_fit(contacts)).then_some(block)
     }
 
     /// How it begins, where it is written.
     pub fn opening(&self) -> [u8; 8 * OPENING] {
-        let count = |nodes: Stored| self.columns[nodes as usize].len() / size_of::<u32>();
-        let numbers = [self.first, self.points(), count(Stored::ContactNodes), count(Stored::TouchNodes)];
+        let contacts = self.columns[Stored::ContactNodes as usize].len() / size_of::<u32>();
+        let numbers = [self.first, self.points(), contacts];
         bytemuck::cast(numbers.map(|number| (number as u64).to_le_bytes()))
     }
 
-    /// Whether the rows that end at `ends` follow one another up to `count`.
-    fn rows_fit(&self, ends: Stored, count: usize) -> bool {
-        let ends = self.columns[ends as usize].chunks_exact(size_of::<u64>());
+    /// Whether the rows of contacts follow one another up to `count`.
+    fn rows_fit(&self, count: usize) -> bool {
+        let ends = self.columns[Stored::ContactOffsets as usize].chunks_exact(size_of::<u64>());
         let ends: Vec<u64> = ends.map(bytemuck::pod_read_unaligned).collect();
         ends.is_sorted() && ends.last().copied().unwrap_or(0) == count as u64
     }
@@ -128,10 +127,7 @@ impl<'a> Block<'a> {
 
     /// The column `array` of points, an entry of which takes `size` bytes.
     pub fn bytes(&self, array: Stored, points: Range<usize>, size: usize) -> &'a [u8] {
-        let entries = match array.ends() {
-            Some(ends) => self.rows(ends, points),
-            None => points,
-        };
+        let entries = if array.is_of_contacts() { self.rows(points) } else { points };
         &self.columns[array as usize][size * entries.start..size * entries.end]
     }
 
@@ -147,12 +143,13 @@ impl<'a> Block<'a> {
                 [0, 1, 2].map(|k| self.number::<f32>(Stored::ContactForces, 3 * contact + k).into()),
             ),
         };
-        self.rows(Stored::ContactOffsets, row..row + 1).map(force).collect()
+        self.rows(row..row + 1).map(force).collect()
     }
 
-    /// Which contacts, or touches, are those of points; `ends` are their ends.
-    pub fn rows(&self, ends: Stored, points: Range<usize>) -> Range<usize> {
-        let before = |point: usize| point.checked_sub(1).map_or(0, |row| self.number::<u64>(ends, row) as usize);
+    /// Which contacts are those of points.
+    pub fn rows(&self, points: Range<usize>) -> Range<usize> {
+        let end = |row: usize| self.number::<u64>(Stored::ContactOffsets, row) as usize;
+        let before = |point: usize| point.checked_sub(1).map_or(0, end);
         before(points.start)..before(points.end)
     }
 }

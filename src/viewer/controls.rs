@@ -10,7 +10,8 @@ use super::{
     theme::{CHOICE_WIDTH, GROUP_GAP},
     view_renderer::Quantity,
 };
-use crate::scene::{Algorithm, EFFECTS, Effect, Interpolation, Scene, Tuning};
+use crate::scene::{ContactLaw, EFFECTS, Effect, Interpolation, Scene, Tuning};
+use clap::ValueEnum as _;
 use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
 use std::sync::Arc;
 
@@ -110,7 +111,7 @@ impl Controls {
                 .width(CHOICE_WIDTH)
                 .selected_text(chosen.name())
                 .show_ui(ui, |ui| {
-                    for interpolation in Interpolation::NAMED {
+                    for interpolation in Interpolation::ALL {
                         let lacking = lacking(interpolation, loaded);
                         ui.add_enabled_ui(lacking.is_none(), |ui| {
                             let choice = ui.selectable_value(chosen, interpolation, interpolation.name());
@@ -165,13 +166,13 @@ impl Controls {
         let mut contact = scene.contact;
         ui.horizontal(|ui| {
             let label =
-                ui.label("Solve").on_hover_text("The algorithm that finds the equilibrium of each configuration");
-            ComboBox::from_id_salt("algorithm")
+                ui.label("Solve").on_hover_text("The law of contact: depths and directions before the surface at rest, before the deformed one, or the paper's iteration");
+            ComboBox::from_id_salt("law")
                 .width(CHOICE_WIDTH)
-                .selected_text(contact.algorithm.name())
+                .selected_text(contact.law.name())
                 .show_ui(ui, |ui| {
-                    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
-                        ui.selectable_value(&mut contact.algorithm, algorithm, algorithm.name());
+                    for &law in ContactLaw::value_variants() {
+                        ui.selectable_value(&mut contact.law, law, law.name());
                     }
                 })
                 .response
@@ -235,10 +236,7 @@ fn note(ui: &mut Ui, text: String) -> Response {
 /// What `interpolation` needs and is not `loaded`, in words.
 fn lacking(interpolation: Interpolation, loaded: &Loaded) -> Option<&'static str> {
     match interpolation {
-        Interpolation::Direct if loaded.live.is_none() => Some("A dataset is interpolated: open the scene itself"),
-        Interpolation::Linear | Interpolation::Potential if loaded.live.is_some() => {
-            Some("Contact is solved in every tick: haptize the scene first")
-        }
+        _ if loaded.live.is_some() => Some("Contact is solved in every tick: haptize the scene first"),
         of if of.is_potential() && loaded.dataset.energy.is_none() => Some("This dataset holds no energy"),
         _ => None,
     }

@@ -48,7 +48,7 @@ impl Loaded {
     fn of(setup: Setup, dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, SetupError> {
         let scene = scene.or_else(|| {
             let path = file.clone().unwrap_or_else(|| setup.scene.path.clone());
-            Scene::parse(&dataset.scene, path).ok()
+            Scene::of_dataset(&dataset.scene, path, &dataset.provenance.algorithm).ok()
         });
         let forces = setup.contact_forces(&dataset)?;
         Ok(Self {

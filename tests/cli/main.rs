@@ -230,7 +230,7 @@ fn bake_info_and_export_tell_the_same() {
     ] {
         assert!(!baked[key].is_null(), "{key} in {baked}");
     }
-    assert_eq!((&baked["backend"], &baked["algorithm"]), (&"cpu".into(), &"energy".into()));
+    assert_eq!((&baked["backend"], &baked["algorithm"]), (&"cpu".into(), &"rest".into()));
     let held = json(folder.path(), &["info", "f.haptize", "--json"]);
     assert_eq!(held["points"], baked["points"]);
     assert_eq!(held["contact"], baked["contact_points"]);

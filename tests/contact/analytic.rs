@@ -4,7 +4,7 @@ use crate::fixture::{contact, octahedron, probe};
 use glam::DVec3;
 use haptize::contact::{Model, Solver, Status};
 use haptize::object::Compliance;
-use haptize::scene::Algorithm;
+use haptize::scene::ContactLaw;
 
 /// A node pressed into the middle of a face of a regular octahedron: by its threefold symmetry the face moves along its
 /// normal N and stays flat, so lambda = kc d / (1 + kc c) exactly, c = N . C N of the mean displacement of the three
@@ -22,13 +22,13 @@ fn a_node_on_the_middle_of_a_symmetric_face_feels_two_springs_in_series() {
             c += normal.dot(compliance.block(i, j) * normal) / 9.0;
         }
     }
-    for algorithm in [Algorithm::Energy, Algorithm::Rest] {
+    for law in [ContactLaw::Following, ContactLaw::Rest] {
         for stiffness in [1.0, 1e2, 1e4, 1e6] {
             for depth in [1e-9, 1e-6, 1e-3, 1e-2] {
-                let model = Model::new(&object, &chain, contact(algorithm, stiffness));
+                let model = Model::new(&object, &chain, contact(law, stiffness));
                 let kc = 3.0 * stiffness;
                 let equilibrium = Solver::new(&model).solve(&[depth]);
-                assert_eq!(equilibrium.status, Status::Contact, "{algorithm:?} {stiffness} {depth}");
+                assert_eq!(equilibrium.status, Status::Contact, "{law:?} {stiffness} {depth}");
                 let lambda = kc * depth / (1.0 + kc * c);
                 // The torque of a sliding joint is the force along it; coordinates are rounded at 1e-17 m.
                 let tolerance = 1e-8 * lambda + kc * 1e-16;
@@ -50,7 +50,7 @@ fn touching_without_depth_is_free() {
     let normal = DVec3::ONE.normalize();
     let middle = (object.rest[0] + object.rest[1] + object.rest[2]) / 3.0;
     let chain = probe(middle + normal * 0.01, -normal);
-    let model = Model::new(&object, &chain, contact(Algorithm::Energy, 500.0));
+    let model = Model::new(&object, &chain, contact(ContactLaw::Following, 500.0));
     let mut solver = Solver::new(&model);
     assert_eq!(solver.solve(&[0.01 - 1e-12]).status, Status::Free);
     assert_eq!(solver.solve(&[0.01 + 1e-12]).status, Status::Contact);
@@ -63,11 +63,11 @@ fn touching_without_depth_is_free() {
 #[test]
 fn symmetric_positions_give_finite_numbers() {
     let object = octahedron();
-    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
+    for law in [ContactLaw::Following, ContactLaw::Rest, ContactLaw::Paper] {
         for axis in [DVec3::Z, DVec3::X + DVec3::Z, DVec3::ONE] {
             let axis = axis.normalize();
             let chain = probe(axis * 0.1, -axis);
-            let model = Model::new(&object, &chain, contact(algorithm, 500.0));
+            let model = Model::new(&object, &chain, contact(law, 500.0));
             let mut solver = Solver::new(&model);
             for k in 0..=100 {
                 let equilibrium = solver.solve(&[0.2 * f64::from(k) / 100.0]);
@@ -102,7 +102,7 @@ fn in_the_trough(height: f64, aside: f64) -> (f64, f64, Status) {
     object = crate::fixture::grounded(&object, 1e12);
     assert_eq!(object.rest.len(), rigid);
     let chain = crate::fixture::ball(DVec3::new(0.0, 0.185, height), DVec3::X, 0.02);
-    let model = Model::new(&object, &chain, contact(Algorithm::Energy, 1e3));
+    let model = Model::new(&object, &chain, contact(ContactLaw::Following, 1e3));
     let equilibrium = Solver::new(&model).solve(&[aside]);
     (equilibrium.energy, equilibrium.torque[0], equilibrium.status)
 }

@@ -7,11 +7,11 @@ use haptize::contact::{Equilibrium, Model, Solver, Status, Touch};
 use haptize::fixtures::bodies::{self, BALL, RADIUS, floating_bar, pressed};
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::scene::{Algorithm, ContactSurface, SpringKind};
+use haptize::scene::{ContactLaw, ContactSurface, SpringKind};
 
 /// Solves all configurations, checks those in contact, and returns how many were and how many of them converged.
 fn check(object: &Object, chain: &Chain, stiffness: f64, configurations: &[Vec<f64>]) -> (usize, usize) {
-    let model = Model::new(object, chain, contact(Algorithm::Energy, stiffness));
+    let model = Model::new(object, chain, contact(ContactLaw::Following, stiffness));
     let mut solver = Solver::new(&model);
     let (mut touching, mut converged) = (0, 0);
     for q in configurations {
@@ -155,7 +155,7 @@ fn rigid_balls_on_facets_finer_than_themselves_balance_on_a_skin() {
 fn the_residual_of_rigid_contact_is_the_imbalance_of_forces() {
     let object = sphere(SpringKind::Isotropic);
     let chain = Chain::new(&arm(0.0));
-    let model = Model::new(&object, &chain, contact(Algorithm::Energy, f64::INFINITY));
+    let model = Model::new(&object, &chain, contact(ContactLaw::Following, f64::INFINITY));
     let mut solver = Solver::new(&model);
     let mut compared = 0;
     for q in random_configurations(3, 60) {
@@ -335,7 +335,7 @@ fn torque_is_minus_the_gradient_of_stored_energy() {
 fn perturbed_results_are_rejected() {
     let object = sphere(SpringKind::Isotropic);
     let chain = Chain::new(&arm(0.0));
-    let model = Model::new(&object, &chain, contact(Algorithm::Energy, 500.0));
+    let model = Model::new(&object, &chain, contact(ContactLaw::Following, 500.0));
     let mut solver = Solver::new(&model);
     let (q, right) = random_configurations(1, 120)
         .into_iter()

@@ -1,14 +1,14 @@
-//! The three algorithms beside each other.
+//! The three laws beside each other.
 
 use crate::fixture::{SPHERE_CENTRE, arm, contact, probe, random_configurations, spec, sphere};
 use crate::oracle::check_account;
 use haptize::contact::{Equilibrium, Model, Solver, Status};
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::scene::{Algorithm, Shape, SpringKind};
+use haptize::scene::{ContactLaw, Shape, SpringKind};
 
-fn solve(object: &Object, chain: &Chain, algorithm: Algorithm, stiffness: f64, q: &[f64]) -> Equilibrium {
-    let model = Model::new(object, chain, contact(algorithm, stiffness));
+fn solve(object: &Object, chain: &Chain, law: ContactLaw, stiffness: f64, q: &[f64]) -> Equilibrium {
+    let model = Model::new(object, chain, contact(law, stiffness));
     Solver::new(&model).solve(q)
 }
 
@@ -21,8 +21,8 @@ fn contact_at_rest_tends_to_the_energy_form_as_depth_tends_to_zero() {
     let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalize();
     let chain = probe(point, -normal);
     let difference = |depth: f64| {
-        let exact = solve(&object, &chain, Algorithm::Energy, 1e3, &[depth]);
-        let linear = solve(&object, &chain, Algorithm::Rest, 1e3, &[depth]);
+        let exact = solve(&object, &chain, ContactLaw::Following, 1e3, &[depth]);
+        let linear = solve(&object, &chain, ContactLaw::Rest, 1e3, &[depth]);
         assert!(exact.status == Status::Contact && linear.status == Status::Contact);
         (exact.torque[0] - linear.torque[0]).abs() / exact.torque[0].abs()
     };
@@ -41,8 +41,8 @@ fn the_papers_iteration_is_close_to_the_energy_form_at_soft_contact() {
     for segments in [10, 20] {
         let shape = Shape::Sphere { centre: SPHERE_CENTRE, radius: 0.05, rings: segments, segments };
         let object = Object::build(&spec(shape, SpringKind::Isotropic)).unwrap();
-        let paper = Model::new(&object, &chain, contact(Algorithm::Paper, 1.0));
-        let energy = Model::new(&object, &chain, contact(Algorithm::Energy, 1.0));
+        let paper = Model::new(&object, &chain, contact(ContactLaw::Paper, 1.0));
+        let energy = Model::new(&object, &chain, contact(ContactLaw::Following, 1.0));
         let (mut paper, mut energy) = (Solver::new(&paper), Solver::new(&energy));
         let mut differences = Vec::new();
         for q in random_configurations(7, 200) {
@@ -72,7 +72,7 @@ fn the_papers_iteration_says_when_it_has_lost_contact() {
     let configurations = random_configurations(8, 150);
     let mut shares = Vec::new();
     for stiffness in [100.0, 300.0, 3e3, 3e4] {
-        let model = Model::new(&object, &chain, contact(Algorithm::Paper, stiffness));
+        let model = Model::new(&object, &chain, contact(ContactLaw::Paper, stiffness));
         let mut solver = Solver::new(&model);
         let (mut touching, mut converged) = (0, 0);
         for q in &configurations {
@@ -99,7 +99,7 @@ fn the_papers_iteration_says_when_it_has_lost_contact() {
 fn contact_at_rest_obeys_its_law_at_every_node() {
     let object = sphere(SpringKind::Axial);
     let chain = Chain::new(&arm(0.0));
-    let model = Model::new(&object, &chain, contact(Algorithm::Rest, 1e3));
+    let model = Model::new(&object, &chain, contact(ContactLaw::Rest, 1e3));
     let mut solver = Solver::new(&model);
     let mut touching = 0;
     for q in random_configurations(9, 80) {
@@ -132,8 +132,8 @@ fn contact_at_rest_obeys_its_law_at_every_node() {
 fn a_node_at_the_centre_ends() {
     let object = sphere(SpringKind::Isotropic);
     let chain = probe(SPHERE_CENTRE, glam::DVec3::Z);
-    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
-        let equilibrium = solve(&object, &chain, algorithm, 500.0, &[0.0]);
+    for law in [ContactLaw::Following, ContactLaw::Rest, ContactLaw::Paper] {
+        let equilibrium = solve(&object, &chain, law, 500.0, &[0.0]);
         assert_ne!(equilibrium.status, Status::Free);
         assert!(equilibrium.energy.is_finite() && equilibrium.torque.is_finite());
     }

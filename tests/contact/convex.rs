@@ -9,7 +9,7 @@ use glam::DVec3;
 use haptize::contact::{Model, Solver, Status};
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::scene::{Algorithm, SpringKind};
+use haptize::scene::{ContactLaw, SpringKind};
 
 /// Entries of a sparse matrix.
 #[derive(Default)]
@@ -100,7 +100,7 @@ fn an_interior_point_solver_confirms_contact_at_rest() {
     let object = sphere(SpringKind::Isotropic);
     let chain = Chain::new(&arm(0.0));
     for stiffness in [100.0, 1e4] {
-        let model = Model::new(&object, &chain, contact(Algorithm::Rest, stiffness));
+        let model = Model::new(&object, &chain, contact(ContactLaw::Rest, stiffness));
         let mut solver = Solver::new(&model);
         let mut compared = 0;
         for q in random_configurations(21, 60) {

@@ -7,7 +7,7 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::{
-        Algorithm, ContactSpec, GroundStiffness, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind,
+        ContactLaw, ContactSpec, GroundStiffness, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind,
     },
 };
 
@@ -91,8 +91,8 @@ pub fn ball(from: DVec3, axis: DVec3, radius: f64) -> Chain {
 }
 
 /// Contact springs Kc (N/m), and few iterations: what converges here does so soon.
-pub fn contact(algorithm: Algorithm, stiffness: f64) -> ContactSpec {
-    ContactSpec { algorithm, max_iterations: 100, ..bodies::contact(stiffness) }
+pub fn contact(law: ContactLaw, stiffness: f64) -> ContactSpec {
+    ContactSpec { law, max_iterations: 100, ..bodies::contact(stiffness) }
 }
 
 /// Joint coordinates of [`arm`] at random, about a third of them in contact with the sphere.

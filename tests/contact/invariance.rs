@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use haptize::contact::{Equilibrium, Model, Solver, Status};
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::scene::{Algorithm, ProxySpec, SpringKind};
+use haptize::scene::{ContactLaw, ProxySpec, SpringKind};
 
 /// Object and proxy turned by `rotation`, then moved by `shift`.
 fn moved(original: &Object, proxy: &ProxySpec, rotation: DMat3, shift: DVec3) -> (Object, Chain) {
@@ -22,8 +22,8 @@ fn moved(original: &Object, proxy: &ProxySpec, rotation: DMat3, shift: DVec3) ->
     (object(nodes, original.triangles.clone()), Chain::new(&proxy))
 }
 
-fn solve_all(object: &Object, chain: &Chain, algorithm: Algorithm) -> Vec<Equilibrium> {
-    let model = Model::new(object, chain, contact(algorithm, 500.0));
+fn solve_all(object: &Object, chain: &Chain, law: ContactLaw) -> Vec<Equilibrium> {
+    let model = Model::new(object, chain, contact(law, 500.0));
     let mut solver = Solver::new(&model);
     random_configurations(11, 80).iter().map(|q| solver.solve(q)).collect()
 }
@@ -44,14 +44,14 @@ fn largest_difference(a: &[Equilibrium], b: &[Equilibrium]) -> f64 {
 fn turning_and_moving_the_world_changes_nothing() {
     let original = sphere(SpringKind::Isotropic);
     let rotation = DMat3::from_axis_angle(DVec3::new(1.0, -2.0, 0.5).normalize(), 1.1);
-    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
-        let here = solve_all(&original, &Chain::new(&arm(0.0)), algorithm);
+    for law in [ContactLaw::Following, ContactLaw::Rest, ContactLaw::Paper] {
+        let here = solve_all(&original, &Chain::new(&arm(0.0)), law);
         assert!(here.iter().filter(|e| e.status == Status::Contact).count() > 8);
         let (turned, chain) = moved(&original, &arm(0.0), rotation, DVec3::new(0.3, -0.2, 0.1));
-        assert!(largest_difference(&here, &solve_all(&turned, &chain, algorithm)) < 1e-7);
+        assert!(largest_difference(&here, &solve_all(&turned, &chain, law)) < 1e-7);
         // A kilometre away coordinates are rounded at 1e-13 m: 1e-10 of a depth of a millimetre.
         let (far, chain) = moved(&original, &arm(0.0), DMat3::IDENTITY, DVec3::new(1000.0, -700.0, 300.0));
-        assert!(largest_difference(&here, &solve_all(&far, &chain, algorithm)) < 1e-6);
+        assert!(largest_difference(&here, &solve_all(&far, &chain, law)) < 1e-6);
     }
 }
 
@@ -63,8 +63,8 @@ fn results_do_not_depend_on_what_was_solved_before() {
     let mut staying = 0;
     for radius in [0.0, 0.008] {
         let chain = Chain::new(&arm(radius));
-        for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
-            let model = Model::new(&object, &chain, contact(algorithm, 2e3));
+        for law in [ContactLaw::Following, ContactLaw::Rest, ContactLaw::Paper] {
+            let model = Model::new(&object, &chain, contact(law, 2e3));
             let mut together = Solver::new(&model);
             for q in random_configurations(12, 30) {
                 for turn in [0.0, 0.03, -0.03] {
@@ -95,8 +95,8 @@ fn broken_numbers_are_flagged_and_never_come_out() {
     let object = sphere(SpringKind::Isotropic);
     let chain = Chain::new(&arm(0.0));
     let q = [0.0, 0.25, 0.1];
-    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
-        let model = Model::new(&object, &chain, contact(algorithm, 500.0));
+    for law in [ContactLaw::Following, ContactLaw::Rest, ContactLaw::Paper] {
+        let model = Model::new(&object, &chain, contact(law, 500.0));
         let mut solver = Solver::new(&model);
         let right = solver.solve(&q);
         assert!(right.gap < 0.0);
@@ -110,8 +110,8 @@ fn broken_numbers_are_flagged_and_never_come_out() {
         let absurd = solver.solve(&[1e300, -1e300, 1e300]);
         assert!(absurd.torque.is_finite() && absurd.energy.is_finite() && absurd.gap.is_finite());
     }
-    for algorithm in [Algorithm::Energy, Algorithm::Rest, Algorithm::Paper] {
-        let mut model = Model::new(&object, &chain, contact(algorithm, 500.0));
+    for law in [ContactLaw::Following, ContactLaw::Rest, ContactLaw::Paper] {
+        let mut model = Model::new(&object, &chain, contact(law, 500.0));
         std::sync::Arc::make_mut(&mut model.compliance).entries.fill(f64::NAN);
         assert_harmless(&Solver::new(&model).solve(&q));
     }

@@ -6,7 +6,7 @@ use haptize::device::Motion;
 use haptize::fixtures::Random;
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::scene::{Algorithm, Scene};
+use haptize::scene::{ContactLaw, Scene};
 
 /// Rounding of a torque, over the largest entry, and of an energy, over itself (1): the sets of rows are the same, and
 /// their order is not; in stiff contact rows are good to 1e-16 kc times the object's compliance, 1e-10.
@@ -20,7 +20,7 @@ fn scene(name: &str, edit: impl Fn(String) -> String) -> Scene {
     let path = format!("{}/datasets/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = edit(std::fs::read_to_string(&path).unwrap());
     let mut scene = Scene::parse(&text, path).unwrap();
-    scene.contact.algorithm = Algorithm::Rest;
+    scene.contact.law = ContactLaw::Rest;
     scene
 }
 

@@ -9,12 +9,12 @@ use haptize::fixtures::bodies::{self, PAPER};
 use haptize::joint_matrix::lower;
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind};
+use haptize::scene::{ContactLaw, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind};
 use haptize::sweep::CpuBackend;
 
 /// Contact at rest of stiffness kc at a contact point (N/m).
 fn contact(kc: f64) -> ContactSpec {
-    ContactSpec { surface: ContactSurface::Smooth, ..crate::fixture::contact(Algorithm::Rest, kc / 3.0) }
+    ContactSpec { surface: ContactSurface::Smooth, ..crate::fixture::contact(ContactLaw::Rest, kc / 3.0) }
 }
 
 /// An object, an arm, and configurations of it, most of which touch.
@@ -174,6 +174,42 @@ fn the_tangent_is_the_derivative_of_the_torque() {
     }
 }
 
+/// Step of central differences along an edge (rad): the torque bends over some 0.1 rad, which leaves 1e-8 of it.
+const ALONG: f64 = 1e-5;
+
+/// In the plane of symmetry of the touch scene a closest point lies exactly on an edge, where the surface need not be
+/// smooth across: the tangent is that of one side, and along the edge the derivative of the torque.
+#[test]
+fn the_tangent_holds_along_an_edge_that_the_closest_point_lies_on() {
+    let Sample { object, chain, .. } = shipped("touch", 0);
+    let mut model = Model::new(&object, &chain, contact(1e3));
+    model.with_tangent = true;
+    let mut solver = Solver::new(&model);
+    let (mut compared, mut worst) = (0, 0.0_f64);
+    for shoulder in 0..6 {
+        for elbow in 18..26 {
+            let q = [0.0, 0.025 * f64::from(shoulder), -0.739 + 0.038_13 * f64::from(elbow)];
+            let Equilibrium { status: Status::Contact, tangent: Some(tangent), .. } = solver.solve(&q) else {
+                continue;
+            };
+            for k in 1..3 {
+                let mut torque = |step: f64| {
+                    let mut moved = q;
+                    moved[k] += step;
+                    solver.solve(&moved).torque
+                };
+                let (after, before) = (torque(ALONG), torque(-ALONG));
+                for l in 1..3 {
+                    let difference = (after[l] - before[l]) / (2.0 * ALONG);
+                    worst = worst.max((tangent[k][l] - difference).abs() / (1.0 + difference.abs()));
+                }
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared > 20 && worst < 1e-3, "{compared} {worst}");
+}
+
 #[test]
 fn results_have_the_same_bits_on_any_number_of_threads() {
     let Sample { object, chain, places, .. } = shipped("mesh", 200);
@@ -282,8 +318,8 @@ fn contact_at_rest_agrees_with_the_energy_form_at_ordinary_depths() {
     for (name, count, most) in [("mesh", 60, 0.03), ("touch", 8000, 0.001), ("organ", 200, 0.03)] {
         let Sample { object, chain, places, .. } = shipped(name, count);
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("datasets/{name}.toml"));
-        let energy = Model::new(&object, &chain, Scene::load(path).unwrap().contact);
-        let rest = energy.with_contact(ContactSpec { algorithm: Algorithm::Rest, ..energy.contact });
+        let rest = Model::new(&object, &chain, Scene::load(path).unwrap().contact);
+        let energy = rest.with_contact(ContactSpec { law: ContactLaw::Following, ..rest.contact });
         let (mut following, mut at_rest) = (Solver::new(&energy), Solver::new(&rest));
         let (mut off, mut size) = (0.0, 0.0);
         for q in &places {

@@ -6,5 +6,10 @@
 mod block;
 mod channels;
 mod effects;
+mod history;
+mod memory;
 mod passivity;
+#[path = "../../src/random.rs"]
+#[allow(dead_code, unreachable_pub)] // The library has more use for it.
+mod random;
 mod trace;

@@ -30,7 +30,7 @@ pub fn haptics(joints: usize) -> HapticsSpec {
         encoder_step: all(0.0),
         device_friction: all(0.0),
         friction: None,
-        contact_damping: None,
+        relaxation: None,
         four_channel: None,
         passivity_control: false,
         hand: HandSpec { stiffness: all(20.0), damping: all(0.2), inertia: all(2e-3) },

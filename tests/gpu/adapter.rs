@@ -79,7 +79,7 @@ mod twice {
                 "small.toml",
                 "--backend",
                 "gpu",
-                "--geometry",
+                "--law",
                 "rest",
                 "--measure-error",
                 "0",
@@ -115,7 +115,7 @@ mod twice {
         std::fs::write(folder.path().join("small.toml"), include_str!("../scenes/small.toml")).unwrap();
         for backend in ["auto", "gpu"] {
             let output =
-                program(folder.path(), "#1,#3", &["bake", "small.toml", "--geometry", "rest", "--backend", backend]);
+                program(folder.path(), "#1,#3", &["bake", "small.toml", "--law", "rest", "--backend", backend]);
             let said = String::from_utf8(output.stderr).unwrap();
             assert!(!output.status.success() && said.contains("\"#3\"") && !said.contains("\"#1\""), "{said}");
         }

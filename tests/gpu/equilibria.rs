@@ -9,7 +9,7 @@ use haptize::{
     joint_matrix::lower,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    scene::{ContactLaw, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
     sweep::Backend,
 };
 use std::sync::Arc;
@@ -80,7 +80,7 @@ fn compare(cpu: &[Equilibrium], gpu: &[Equilibrium], nodes: usize) -> Result<Off
         }
         off.tangent = off.tangent.max(difference(&entries(cpu), &entries(gpu)));
         size.tangent = size.tangent.max(greatest(&entries(cpu)));
-        let pushed = [cpu, gpu].map(|it| it.on_proxy().into_iter().map(|touch| touch.force).sum::<DVec3>());
+        let pushed = [cpu, gpu].map(|it| it.on_proxy().map(|(_, force)| force).sum::<DVec3>());
         off.force = off.force.max(pushed[0].distance(pushed[1]));
     }
     let over = |off: f64, size: f64| if size > 0.0 { off / size } else { off };
@@ -254,7 +254,7 @@ const LONG_ARM: &str = r#"
     ground = { stiffness = 100.0 }
     [contact]
     stiffness = 300.0
-    geometry = "rest"
+    law = "rest"
     surface = "facets"
     [grid]
     axes = [{ start = 0.60, stop = 0.64, count = 101 }, { start = -0.03, stop = 0.03, count = 31 }]
@@ -363,11 +363,11 @@ fn other_algorithms_are_refused() {
     let (scene, object, chain) = load("sphere.toml");
     let mut model = Model::new(&object, &chain, scene.contact);
     assert!(GpuSolver::new(context(), &model).is_ok());
-    for algorithm in [Algorithm::Energy, Algorithm::Paper] {
-        model.contact.algorithm = algorithm;
+    for law in [ContactLaw::Following, ContactLaw::Paper] {
+        model.contact.law = law;
         let refusal = GpuSolver::new(context(), &model).err().unwrap();
-        assert!(matches!(refusal, GpuError::Algorithm(_)), "{refusal}");
+        assert!(matches!(refusal, GpuError::Law(_)), "{refusal}");
         let said = refusal.to_string();
-        assert!(said.contains(algorithm.name()) && said.contains("geometry = \"rest\""), "{said}");
+        assert!(said.contains(law.name()) && said.contains("law = \"rest\""), "{said}");
     }
 }

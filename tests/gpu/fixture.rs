@@ -5,7 +5,7 @@ use haptize::{
     gpu::{AdapterChoice, Context},
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, Material, Scene},
+    scene::{ContactLaw, Material, Scene},
 };
 use std::{
     path::Path,
@@ -35,7 +35,7 @@ pub fn load_of(name: &str, material: Option<Material>) -> (Scene, Object, Chain)
     };
     scene.object.material = material.unwrap_or(scene.object.material);
     // That is what the kernel solves.
-    scene.contact.algorithm = Algorithm::Rest;
+    scene.contact.law = ContactLaw::Rest;
     let object = Object::build(&scene.object).unwrap();
     let chain = Chain::new(&scene.proxy);
     (scene, object, chain)

@@ -79,8 +79,7 @@ fn a_store_that_the_gpu_fills_is_the_cpus() {
 #[test]
 fn a_refined_bake_names_the_gpu_that_solved() {
     let folder = tempfile::tempdir().unwrap();
-    let scene =
-        include_str!("../scenes/small.toml").replace("stiffness = 1000.0", "stiffness = 1000.0\ngeometry = \"rest\"");
+    let scene = include_str!("../scenes/small.toml");
     std::fs::write(folder.path().join("small.toml"), scene).unwrap();
     let bake = |backend: &str| -> serde_json::Value {
         let mut program = Command::new(env!("CARGO_BIN_EXE_haptize"));

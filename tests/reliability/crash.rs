@@ -22,7 +22,7 @@ const KILLS: usize = 4;
 
 /// A bake of `scene.toml` into `x.haptize`, continued if there is anything.
 fn bake(backend: &str) -> [&str; 9] {
-    ["bake", "scene.toml", "-o", "x.haptize", "--backend", backend, "--geometry", "rest", "--resume"]
+    ["bake", "scene.toml", "-o", "x.haptize", "--backend", backend, "--law", "rest", "--resume"]
 }
 
 /// Header without date and checksum, and data.

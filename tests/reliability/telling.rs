@@ -245,7 +245,7 @@ fn an_adapter_that_is_named_and_not_there_is_an_error_and_no_missing_driver() {
     let home = home();
     let named =
         |arguments: &[&str]| command(home.path(), arguments).env("WGPU_ADAPTER_NAME", "nosuch").output().unwrap();
-    let bake = ["bake", "scene.toml", "-o", "y.haptize", "--geometry", "rest"];
+    let bake = ["bake", "scene.toml", "-o", "y.haptize", "--law", "rest"];
     for arguments in [&bake[..], &["view", "x.haptize", "--screenshot", "x.png"]] {
         let output = named(arguments);
         let said = message(&output);

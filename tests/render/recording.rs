@@ -67,9 +67,9 @@ fn marked() -> Trace {
 const TRACE_FILE: &str = "\
 time [s],hand a_b [rad],hand c [m],device a_b [rad],device c [m],proxy a_b [rad],proxy c [m],device torque a_b [N m],\
 device torque c [N],held torque a_b [N m],held torque c [N],contact torque a_b [N m],contact torque c [N],\
-contact index,contact,contact nodes,flags,fault,clamps,halt,initial [J],kinetic [J],spring [J],bristles [J],\
+contact index,contact,contact nodes,flags,fault,clamps,halt,initial [J],kinetic [J],spring [J],presliding [J],\
 coupling work [J],channel work [J],field work [J],stop work [J],proxy dissipation [J],coupling dissipation [J],\
-friction dissipation [J],contact dissipation [J],control dissipation [J],residual [J],exchanged [J],stored [J],\
+friction dissipation [J],control dissipation [J],residual [J],exchanged [J],stored [J],relaxed [J],\
 first stored [J],leak [J],port work [J],device dissipation [J]
 ";
 

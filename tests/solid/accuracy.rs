@@ -13,7 +13,7 @@ fn reference(body: &str, poisson: f64) -> f64 {
 }
 
 /// Mean displacement under the pressure `3/(pi a^2) (1 - r^2/a^2)^2` around `middle` along `-up`, over its force (m/N).
-fn compliance(object: &Object, middle: DVec3, up: DVec3) -> f64 {
+pub fn compliance(object: &Object, middle: DVec3, up: DVec3) -> f64 {
     let areas = own_areas(object);
     let mut forces = vec![DVec3::ZERO; object.rest.len()];
     for (node, area) in areas.iter().enumerate() {
@@ -89,5 +89,33 @@ fn offsets_and_turns_of_the_lattice_change_compliance_by_less_than_two_percent()
         let error = compliance(None, turn) / aligned - 1.0;
         println!("turned by {degrees} degrees: {error:.4}");
         assert!(error.abs() < 0.02, "turned by {degrees} degrees around {axis}: {error}");
+    }
+}
+
+/// What is stated of a lattice, against one of half the size: up to a quarter less, and not ten times as much.
+#[test]
+fn the_error_that_is_stated_of_a_lattice_is_what_finer_cubes_change() {
+    for (poisson, cell) in [(0.3, 0.015), (0.45, 0.01), (0.49, 0.015)] {
+        let [found, finer] = [cell, 0.5 * cell].map(|cell| {
+            let shell = super::block([16, 16, 8], 0.00375);
+            let block = solid(shell, elastic(poisson, Some(cell)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO);
+            let own = spec(
+                Shape::Mesh { file: "body".into(), scale: 1.0, centre: DVec3::ZERO, refine: None },
+                elastic(poisson, Some(cell)),
+                clamped(1e-6),
+            );
+            let middle = (0..block.surface_nodes as u32).min_by(|&a, &b| {
+                let from = |node: u32| block.rest[node as usize].distance(0.03 * DVec3::Z);
+                from(a).total_cmp(&from(b))
+            });
+            let near = haptize::object::Compliance::on(&block, middle.into_iter().collect()).unwrap();
+            let stated = block.lattice_error(&own, &near).unwrap();
+            assert_eq!(stated.cell, cell);
+            (compliance(&block, 0.03 * DVec3::Z, DVec3::Z), stated.relative)
+        });
+        let error = (found.0 / finer.0 - 1.0).abs();
+        println!("nu {poisson}, cells of {cell} m: {:.4} stated, {error:.4} found", found.1);
+        let bounds = error / 1.25..10.0 * error;
+        assert!(bounds.contains(&found.1), "nu {poisson}: {error}, {} stated", found.1);
     }
 }

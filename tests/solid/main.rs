@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 mod accuracy;
+mod bodies;
 mod gmsh;
 mod indentation;
 mod lattice;

@@ -41,6 +41,7 @@ fn a_store_comes_back_to_the_bit() {
         for k in 0..50 {
             let q: Vec<f64> = (0..joints).map(|a| 0.1 + 0.2 * (f64::from(k) + a as f64).sin()).collect();
             assert_eq!(refinement(&read).sample(&q), refinement(&written).sample(&q));
+            assert_eq!(refinement(&read).slip(&q), refinement(&written).slip(&q));
         }
         // And to the bit on disk.
         let again = folder.path().join("again.store");

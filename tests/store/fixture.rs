@@ -52,6 +52,14 @@ pub fn blocks(space: &Space, level: u32) -> Vec<Place> {
     places
 }
 
+/// How contacts slip at `q`: affine, the normal force positive.
+pub fn slip(q: &[f64]) -> Vec<f64> {
+    let numbers = width(q.len()) as u32;
+    (0..numbers)
+        .map(|k| 2.0 - 0.1 * f64::from(k) + q.iter().zip(1..).map(|(q, a)| q / f64::from(a)).sum::<f64>())
+        .collect()
+}
+
 /// The nodes of a block, each there with probability `share`, with the numbers that `record` gives for its
 /// configuration.
 pub fn nodes(
@@ -66,7 +74,8 @@ pub fn nodes(
         if is_there(&node) {
             let numbers: Vec<f32> = record(&space.configuration(level, &node)).iter().map(|&x| x as f32).collect();
             assert_eq!(numbers.len(), width(space.joints()));
-            nodes.push(place, &numbers, 0.25, Status::Contact);
+            let slip: Vec<f32> = slip(&space.configuration(level, &node)).iter().map(|&x| x as f32).collect();
+            nodes.push(place, &numbers, &slip, 0.25, Status::Contact);
         }
     }
     nodes

@@ -1,6 +1,6 @@
 //! Continuity at every border of blocks and levels, exactness at nodes and on polynomials, the gradient.
 
-use crate::fixture::{Random, blocks, nodes, noise, space, step, store};
+use crate::fixture::{Random, blocks, nodes, noise, slip, space, step, store};
 use haptize::{
     JointVector, MAX_JOINTS,
     dataset::{Axis, Dataset, Grid, Provenance},
@@ -178,6 +178,26 @@ fn polynomials_are_met_everywhere_whatever_nodes_there_are() {
         // Other polynomials are not met.
         let other = polynomial(&vec![0.05; joints], false);
         assert!((store.sample(&vec![0.05; joints]).value - other[0]).abs() > 1e-3);
+    }
+}
+
+#[test]
+fn slips_that_are_affine_are_met_everywhere_whatever_nodes_there_are() {
+    for joints in 1..=MAX_JOINTS {
+        let store = store(joints, levels(joints), 0.5, 8, noise(joints, 3));
+        assert!(store.has_slips());
+        let mut random = Random(2);
+        for _ in 0..200 {
+            let q: Vec<f64> = (0..joints).map(|a| -0.2 + (1.0 + 0.99 * random.next()) * step(a)).collect();
+            let found = store.slip(&q);
+            for (found, exact) in found.iter().zip(slip(&q)) {
+                assert!((found - exact).abs() < ROUNDING, "{joints}: {found} for {exact}");
+            }
+            assert!(found[width(joints)..].iter().all(|rest| *rest == 0.0));
+        }
+        // A curved one is not met.
+        let curved: Vec<f64> = slip(&vec![0.05; joints]).iter().map(|x| x * x).collect();
+        assert!((store.slip(&vec![0.05; joints])[0] - curved[0]).abs() > 1e-3);
     }
 }
 

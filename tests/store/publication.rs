@@ -83,7 +83,7 @@ fn what_is_not_sound_is_refused() {
     }
     store.publish(0, &block, sound).unwrap();
     let mut even = Nodes::default();
-    even.push(0, &vec![0.0; width(2)], 0.0, Status::Free);
+    even.push(0, &vec![0.0; width(2)], &[], 0.0, Status::Free);
     assert!(matches!(store.publish(1, &block, even), Err(PublishError::Unsound { .. })));
 }
 

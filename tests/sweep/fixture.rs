@@ -86,6 +86,7 @@ pub fn answer(q: &[f64]) -> Equilibrium {
         torque: JointVector::from_slice(&[q[1] / 7.0, q[0] / 3.0]),
         forces: (0..touched).map(|node| NodeForce { node, force: DVec3::new(q[0], q[1], f64::from(node)) }).collect(),
         tangent: None,
+        slip: None,
         touches: Vec::new(),
     }
 }

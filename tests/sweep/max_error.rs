@@ -6,7 +6,7 @@ use haptize::{
     field::TorqueField,
     object::Object,
     proxy::Chain,
-    scene::{Interpolation, Scene},
+    scene::Scene,
     sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError},
 };
 use serde_json::Value;
@@ -144,30 +144,6 @@ fn an_arm_of_slides_alone_errs_by_newtons() {
     assert!(told.contains("rms error of 5.00e-2 N (") && !told.contains("N m"), "{told}");
     let stiffer = haptize(folder.0.path(), &["bake", "a.toml", "--max-error=0.05 N m", "--backend", "cpu"]);
     assert!(String::from_utf8_lossy(&stiffer.stderr).contains("measured in N: give it in N"));
-}
-
-/// What is solved beside the loop answers as `potential` in a dataset, and stays what the scene names.
-#[test]
-fn a_scene_that_is_solved_beside_the_loop_has_errors_costs_and_a_grid_like_another() {
-    let folder = Folder::new();
-    let direct = format!("{}\n[haptics]\ninterpolation = \"direct\"\n", text());
-    std::fs::write(folder.0.path().join("a.toml"), &direct).unwrap();
-    let scene = Scene::parse(&direct, "a.toml").unwrap();
-    let stop = AtomicBool::new(false);
-    let pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
-    let cost = pilot.cost(&scene, 0.05).unwrap();
-    let potential = pilot.prospects.iter().find(|prospect| prospect.interpolation == "potential").unwrap();
-    assert_eq!(cost.points, potential.points);
-    let choice = pilot.choose(&scene, usize::MAX, BackendChoice::Cpu).unwrap();
-    assert_eq!(choice.scene.haptics.interpolation, Interpolation::Direct);
-    assert_eq!(choice.interpolation, "potential");
-
-    let baked = haptize(folder.0.path(), &["bake", "a.toml", "--backend", "cpu", "--max-error", "5%", "--json"]);
-    assert!(baked.status.success(), "{}", String::from_utf8_lossy(&baked.stderr));
-    let measured = Dataset::open(&folder.output()).unwrap().provenance.error.unwrap();
-    assert_eq!(measured.interpolation, "potential");
-    assert!(measured.relative().is_some_and(|error| error > 0.0) && measured.keeps(0.05), "{measured:?}");
-    assert!(measured.lines()[0].starts_with("`potential`"), "{:?}", measured.lines());
 }
 
 #[test]
@@ -324,10 +300,9 @@ fn what_no_refined_bake_can_do_is_refused_before_anything_is_written() {
     let folder = Folder::new();
     let path = folder.0.path();
     std::fs::write(path.join("a.toml"), SCENE).unwrap();
-    std::fs::write(path.join("paper.toml"), SCENE.replace("[contact]\n", "[contact]\nalgorithm = \"paper\"\n"))
-        .unwrap();
+    std::fs::write(path.join("paper.toml"), SCENE.replace("[contact]\n", "[contact]\nlaw = \"paper\"\n")).unwrap();
     let output = haptize(path, &["bake", "paper.toml", "--max-error", "5%", "--refine", "2"]);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.code() == Some(1) && told.contains("leave algorithm out"), "{told}");
+    assert!(output.status.code() == Some(1) && told.contains("leave law out"), "{told}");
     assert_eq!(folder.names(), ["a.toml", "paper.toml"]);
 }

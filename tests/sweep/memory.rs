@@ -64,10 +64,10 @@ fn the_memory_stated_is_the_memory_of_the_columns() {
     let blind = Scene::parse(&SCENE.replace("graphics = {}", "graphics = false"), "small.toml").unwrap();
     let disk = sweep_of(&blind, "none", "").footprint(10, false).disk;
     assert_eq!(disk.least, disk.most);
-    // With friction there are those on the proxy's three nodes.
+    // With friction each point has a normal force and three entries of a slip Jacobian.
     let friction = Scene::parse(&(blind.text + "\n[haptics.friction]\ncoefficient = 0.4\n"), "small.toml").unwrap();
     let friction = sweep_of(&friction, "none", "").footprint(10, false).disk;
-    assert_eq!([friction.least - disk.least, friction.most - friction.least], [8 * POINTS, POINTS * 16 * 3]);
+    assert_eq!([friction.least - disk.least, friction.most - disk.most], [4 * 4 * POINTS; 2]);
 }
 
 #[test]

@@ -4,12 +4,12 @@ use crate::fixture::{Folder, MadeUp, POINTS, SCENE, answer, bake, scene, sweep, 
 use glam::DVec3;
 use haptize::{
     JointVector,
-    contact::{Equilibrium, Model, NodeForce, Solver, Status, Touch},
+    contact::{Equilibrium, Model, NodeForce, Slip, Solver, Status},
     dataset::Dataset,
     fixtures::Random,
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, JointKind, LEVER_ARM, Scene},
+    scene::{ContactLaw, ContactSpec, JointKind, LEVER_ARM, Scene},
     sweep::{BackendChoice, Bake, CpuBackend, FreeSpace, Run, Sweep},
 };
 use std::sync::atomic::AtomicBool;
@@ -37,7 +37,7 @@ fn the_dataset_is_what_the_backend_answered_at_every_grid_point() {
         assert_eq!(forces, expected);
     }
     assert_eq!(dataset.scene, SCENE);
-    assert_eq!(dataset.provenance.algorithm, "energy");
+    assert_eq!(dataset.provenance.algorithm, "rest");
 
     let answers: Vec<_> = (0..POINTS).map(|point| answer(&dataset.grid.configuration(point))).collect();
     let count = |status| answers.iter().filter(|answer| answer.status == status).count();
@@ -82,7 +82,7 @@ fn the_error_of_the_geometry_at_rest_is_stated() {
         let (dataset, _) = bake.in_memory().unwrap();
         (dataset.provenance.backend, dataset.provenance.error.unwrap())
     };
-    scene.contact.algorithm = Algorithm::Rest;
+    scene.contact.law = ContactLaw::Rest;
     // No GPU takes it.
     let (backend, error) = stated(&scene);
     let geometry = error.geometry.unwrap();
@@ -90,7 +90,7 @@ fn the_error_of_the_geometry_at_rest_is_stated() {
 
     let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
     let rest = Model::new(&object, &chain, scene.contact);
-    let following = rest.with_contact(ContactSpec { algorithm: Algorithm::Energy, ..scene.contact });
+    let following = rest.with_contact(ContactSpec { law: ContactLaw::Following, ..scene.contact });
     let (mut at_rest, mut deformed, mut random) = (Solver::new(&rest), Solver::new(&following), Random::new(4));
     let (mut square, mut off, mut deepest) = (0.0, 0.0, 0.0_f64);
     for _ in 0..1500 {
@@ -111,7 +111,7 @@ fn the_error_of_the_geometry_at_rest_is_stated() {
     assert!(found > 0.4 * expected && found < 2.5 * expected, "{found} {expected}");
     assert!(geometry.depth > 0.6 * deepest && geometry.depth < 1.6 * deepest, "{} {deepest}", geometry.depth);
 
-    scene.contact.algorithm = Algorithm::Energy;
+    scene.contact.law = ContactLaw::Following;
     assert!(stated(&scene).1.geometry.is_none());
 }
 
@@ -159,8 +159,9 @@ fn a_file_is_the_same_whichever_number_of_threads_put_it_together() {
     let sweep = sweep_of(&scene, "none", "");
     let touching = |q: &[f64]| {
         let equilibrium = answer(q);
-        let touch = |on: &NodeForce| Touch { proxy_node: on.node, carriers: Vec::new(), force: on.force };
-        Equilibrium { touches: equilibrium.forces.iter().rev().skip(1).rev().map(touch).collect(), ..equilibrium }
+        let mut slip = Slip { normal_force: 1.0 + q[0], ..Slip::default() };
+        (slip.jacobian[0][0], slip.jacobian[1][0], slip.jacobian[1][1]) = (q[0], q[1], q[0] * q[1]);
+        Equilibrium { slip: equilibrium.status.is_in_contact().then_some(slip), ..equilibrium }
     };
     let put_together = |threads| {
         let folder = Folder::new();
@@ -176,17 +177,22 @@ fn a_file_is_the_same_whichever_number_of_threads_put_it_together() {
     let folder = Folder::new();
     std::fs::write(folder.output(), one).unwrap();
     let dataset = Dataset::open(&folder.output()).unwrap();
-    let touches = dataset.touches.as_ref().unwrap();
-    let mut end = 0;
+    let slips = dataset.slip.as_ref().unwrap();
+    let mut touched = 0;
     for point in 0..dataset.grid.points() {
         let expected = touching(&dataset.grid.configuration(point));
         assert_eq!(dataset.torque(point), &expected.torque[..]);
         let forces: Vec<_> = dataset.forces(point).map(|on| (on.node, on.force.as_vec3())).collect();
         assert_eq!(forces, expected.forces.iter().map(|on| (on.node, on.force.as_vec3())).collect::<Vec<_>>());
-        end += expected.touches.len();
-        assert_eq!(touches.offsets[point + 1], end as u64);
+        let Slip { normal_force, jacobian } = expected.slip.unwrap_or_default();
+        let triangle = [jacobian[0][0], jacobian[1][0], jacobian[1][1]].map(|entry| entry as f32);
+        assert_eq!(
+            (slips.normal_force[point], &slips.jacobian[3 * point..][..3]),
+            (normal_force as f32, &triangle[..])
+        );
+        touched += usize::from(normal_force > 0.0);
     }
-    assert!(end > 4096 && end == touches.nodes.len(), "{end}");
+    assert!(touched > 4096, "{touched}");
 }
 
 /// Skipping changes nothing but gaps far from contact, and those are then lower bounds.

@@ -87,7 +87,7 @@ fn a_part_of_another_sweep_is_refused_with_the_difference() {
     let elsewhere = Sweep::new(&scene(), &other, "cpu", "none", date).unwrap();
     assert_eq!(refused(&elsewhere), "another object, such as a mesh that changed meanwhile");
     let mut paper = scene();
-    paper.contact.algorithm = haptize::scene::Algorithm::Paper;
+    paper.contact.law = haptize::scene::ContactLaw::Paper;
     assert_eq!(refused(&sweep_of(&paper, "none", date)), "another algorithm");
     // A refusal changes nothing.
     assert_eq!(

@@ -165,7 +165,7 @@ fn a_scanned_dataset_shows_the_proxy_and_its_c_space_and_says_what_is_not_stored
 fn a_scene_is_baked_on_the_adapter_that_is_chosen() {
     let folder = tempfile::tempdir().unwrap();
     let scene = folder.path().join("small.toml");
-    std::fs::write(&scene, small_scene().replace("algorithm = \"energy\"", "geometry = \"rest\"")).unwrap();
+    std::fs::write(&scene, small_scene().replace("law = \"following\"", "law = \"rest\"")).unwrap();
     let mut window = Window::open(&Start::File(scene), [1200.0, 900.0], Theme::Light);
     let adapter = DEVICE_NAME.get().unwrap();
     assert!(!window.shows(&format!("on {adapter}")), "baked on {adapter} before it was chosen");

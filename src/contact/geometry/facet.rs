@@ -134,6 +134,18 @@ impl Facet {
         best.map_or(ClosestPoint { weights: start, feature: Feature::Face }, |(_, point)| point)
     }
 
+    /// Finds where the closest point `from` of a place next to `x` is for `x`: on the same feature, continued beyond its
+    /// ends, so that it depends smoothly on the place.
+    #[must_use]
+    pub fn followed(&self, x: DVec3, from: &ClosestPoint) -> ClosestPoint {
+        let weights = match from.feature {
+            Feature::Face => self.stationary(x, from.weights),
+            Feature::Edge(k) => on_edge(k, self.stationary_on_edge(x, k, from.weights, [f64::MIN, f64::MAX])),
+            Feature::Vertex(_) => from.weights,
+        };
+        ClosestPoint { weights, feature: from.feature }
+    }
+
     /// Finds the weights at which the distance to `x` is least, on the facet continued beyond its edges. Far outside it
     /// stops, since Newton's method would not come back.
     fn stationary(&self, x: DVec3, start: [f64; 3]) -> [f64; 3] {
@@ -162,31 +174,40 @@ impl Facet {
 
     /// Finds the point of edge k that is closest to `x`, from the point of the edge that is next to `start`.
     fn closest_on_edge(&self, x: DVec3, k: usize, start: [f64; 3]) -> ClosestPoint {
-        let (direction, next) = (EDGES[k][0], (k + 1) % 3);
-        let at = |t: f64| {
-            let mut weights = [0.0; 3];
-            (weights[k], weights[next]) = (1.0 - t, t);
-            weights
+        let t = self.stationary_on_edge(x, k, start, [0.0, 1.0]);
+        let feature = match t {
+            0.0 => Feature::Vertex(k),
+            1.0 => Feature::Vertex((k + 1) % 3),
+            _ => Feature::Edge(k),
         };
+        ClosestPoint { weights: on_edge(k, t), feature }
+    }
+
+    /// Finds the place on edge k, from 0 at its first corner to 1 and within `ends`, at which the distance to `x` is
+    /// least.
+    fn stationary_on_edge(&self, x: DVec3, k: usize, start: [f64; 3], ends: [f64; 2]) -> f64 {
+        let (direction, next) = (EDGES[k][0], (k + 1) % 3);
         let sum = start[k] + start[next];
         let mut t = if sum > 0.0 { start[next] / sum } else { 0.5 };
         for _ in 0..FACET_ITERATIONS {
-            let jet = self.jet(at(t));
+            let jet = self.jet(on_edge(k, t));
             let (offset, tangent) = (jet.point - x, jet.tangent(direction));
             let metric = tangent.dot(tangent);
             let full = metric + offset.dot(jet.bend(direction, direction));
             let before = t;
             t -= offset.dot(tangent) / (if full > 0.0 { full } else { metric }).max(MINIMUM_SQUARE);
-            t = t.clamp(0.0, 1.0);
+            t = t.clamp(ends[0], ends[1]);
             if (t - before).abs() < FACET_STEP {
                 break;
             }
         }
-        let feature = match t {
-            0.0 => Feature::Vertex(k),
-            1.0 => Feature::Vertex(next),
-            _ => Feature::Edge(k),
-        };
-        ClosestPoint { weights: at(t), feature }
+        t
     }
+}
+
+/// The weights of the place `t` on edge k, from 0 at its first corner to 1.
+fn on_edge(k: usize, t: f64) -> [f64; 3] {
+    let mut weights = [0.0; 3];
+    (weights[k], weights[(k + 1) % 3]) = (1.0 - t, t);
+    weights
 }

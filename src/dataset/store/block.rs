@@ -10,6 +10,8 @@ pub struct Nodes {
     pub present: u64,
     /// w, its gradient and mixed derivatives at each (sqrt(J), by rad or m); see [`super::record`].
     pub records: Vec<f32>,
+    /// Slip of the contacts at each ([`super::record::slip_of`]); empty where none is asked for.
+    pub slips: Vec<f32>,
     /// Smallest signed distance between proxy and object at rest (m).
     pub gap: Vec<f32>,
     /// [`Status`] as its number.
@@ -18,9 +20,10 @@ pub struct Nodes {
 
 impl Nodes {
     /// Adds the node at `place`, which is behind those that are there.
-    pub fn push(&mut self, place: usize, record: &[f32], gap: f32, status: Status) {
+    pub fn push(&mut self, place: usize, record: &[f32], slip: &[f32], gap: f32, status: Status) {
         self.present |= 1 << place;
         self.records.extend_from_slice(record);
+        self.slips.extend_from_slice(slip);
         self.gap.push(gap);
         self.status.push(status as u8);
     }
@@ -42,8 +45,9 @@ impl Nodes {
         let count = self.count();
         self.present & !allowed == 0
             && self.records.len() == count * width(joints)
+            && (self.slips.is_empty() || self.slips.len() == self.records.len())
             && (self.gap.len(), self.status.len()) == (count, count)
-            && self.records.iter().chain(&self.gap).all(|number| number.is_finite())
+            && self.records.iter().chain(&self.slips).chain(&self.gap).all(|number| number.is_finite())
             && self.status.iter().all(|&number| Status::from_number(number).is_some())
     }
 }
@@ -56,6 +60,8 @@ pub struct Block {
     /// Numbers of the interpolation at each node less those that the levels below give there, lengths in steps of the
     /// level.
     pub(super) surplus: Box<[f32]>,
+    /// The same of the slips, interpolated multilinearly.
+    pub(super) slip_surplus: Box<[f32]>,
 }
 
 impl Block {
@@ -65,25 +71,37 @@ impl Block {
         &self.nodes
     }
 
-    pub(super) fn new(nodes: Nodes, surplus: Box<[f32]>) -> Self {
+    pub(super) fn new(nodes: Nodes, [surplus, slip_surplus]: [Box<[f32]>; 2]) -> Self {
         let is_failed = |number: &u8| Status::from_number(*number).is_some_and(Status::is_failed);
         let failed = nodes.places().zip(&nodes.status).filter(|(_, status)| is_failed(status));
-        Self { failed: failed.map(|(place, _)| 1 << place).sum(), nodes, surplus }
+        Self { failed: failed.map(|(place, _)| 1 << place).sum(), nodes, surplus, slip_surplus }
     }
 
     /// The surplus of the node at `place`, `kinds` numbers; `None` if it was not solved.
     #[inline]
     pub(super) fn surplus_at(&self, place: usize, kinds: usize) -> Option<&[f32]> {
+        self.row(&self.surplus, place, kinds)
+    }
+
+    /// That of its slip; `None` if it has none.
+    #[inline]
+    pub(super) fn slip_surplus_at(&self, place: usize, kinds: usize) -> Option<&[f32]> {
+        self.row(&self.slip_surplus, place, kinds)
+    }
+
+    #[inline]
+    fn row<'a>(&self, numbers: &'a [f32], place: usize, kinds: usize) -> Option<&'a [f32]> {
         let present = self.nodes.present;
         let rank = (present & ((1 << place) - 1)).count_ones() as usize;
-        if present >> place & 1 == 1 { self.surplus.get(rank * kinds..(rank + 1) * kinds) } else { None }
+        if present >> place & 1 == 1 { numbers.get(rank * kinds..(rank + 1) * kinds) } else { None }
     }
 
     /// Memory of the block (bytes).
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let Nodes { records, gap, status, .. } = &self.nodes;
-        size_of::<Self>() + 4 * (self.surplus.len() + records.len() + gap.len()) + status.len()
+        let Nodes { records, slips, gap, status, .. } = &self.nodes;
+        let surplus = self.surplus.len() + self.slip_surplus.len();
+        size_of::<Self>() + 4 * (surplus + records.len() + slips.len() + gap.len()) + status.len()
     }
 }
 

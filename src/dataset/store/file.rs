@@ -7,6 +7,7 @@
 //! | `block_keys` | u64 | b | level and coordinates of each block (`space.rs`), ascending |
 //! | `block_nodes` | u64 | b | bit p: the block has the node at place p |
 //! | `node_records` | f32 | n, 1 + d (d + 1) / 2 | numbers of each node, by block and place (`record.rs`) |
+//! | `node_slips` | f32 | n, 1 + d (d + 1) / 2 | how the contacts of each slip ([`super::record::slip_of`]); absent without friction |
 //! | `node_gap` | f32 | n | smallest signed distance at rest (m) |
 //! | `node_status` | u8 | n | [`crate::contact::Status`] |
 //! | `surface_nodes`, `surface_triangles`, ... | | | the object's geometry, as in a dataset's file |
@@ -125,7 +126,7 @@ impl Dataset {
             residual: None,
             iterations: None,
             contacts: None,
-            touches: None,
+            slip: None,
             surface,
             refinement: Some(store),
             grid,
@@ -150,6 +151,7 @@ pub(in crate::dataset) fn save(
     let nodes = || blocks.iter().map(|(_, block)| block.nodes());
     let present: Vec<u64> = nodes().map(|nodes| nodes.present).collect();
     let records: Vec<f32> = nodes().flat_map(|nodes| nodes.records.iter().copied()).collect();
+    let slips: Vec<f32> = nodes().flat_map(|nodes| nodes.slips.iter().copied()).collect();
     let gap: Vec<f32> = nodes().flat_map(|nodes| nodes.gap.iter().copied()).collect();
     let status: Vec<u8> = nodes().flat_map(|nodes| nodes.status.iter().copied()).collect();
     let wide = width(store.space.joints());
@@ -160,6 +162,9 @@ pub(in crate::dataset) fn save(
         Tensor::new::<f32>("node_gap", vec![gap.len()], bytemuck::cast_slice(&gap)),
         Tensor::new::<u8>("node_status", vec![status.len()], &status),
     ];
+    if !slips.is_empty() {
+        tensors.push(Tensor::new::<f32>("node_slips", vec![gap.len(), wide], bytemuck::cast_slice(&slips)));
+    }
     tensors.extend(surface.into_iter().flat_map(|surface| surface_tensors(heading.grid, surface)));
     write_container(target, Kind { format: FORMAT, store: Some(&shape) }, heading, tensors)
 }
@@ -186,6 +191,7 @@ fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Datas
     let present = file.take::<u64>("block_nodes", &[Some(keys.len())])?;
     let records = file.take::<f32>("node_records", &[None, Some(wide)])?;
     let count = records.len() / wide;
+    let slips = file.optional::<f32>("node_slips", &[Some(count), Some(wide)])?;
     let gap = file.take::<f32>("node_gap", &[Some(count)])?;
     let status = file.take::<u8>("node_status", &[Some(count)])?;
     let surface = file.surface(&grid)?;
@@ -208,6 +214,7 @@ fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Datas
         let nodes = Nodes {
             present,
             records: records[wide * rows.start..wide * rows.end].to_vec(),
+            slips: slips.as_ref().map_or(Vec::new(), |slips| slips[wide * rows.start..wide * rows.end].to_vec()),
             gap: gap[rows.clone()].to_vec(),
             status: status[rows].to_vec(),
         };

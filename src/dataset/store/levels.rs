@@ -5,7 +5,7 @@
 
 use super::{
     kernel,
-    record::width,
+    record::{MAX_WIDTH, width},
     space::{Cell, Place},
 };
 use crate::{JointVector, dataset::Grid};
@@ -118,6 +118,34 @@ fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize
     }
     root.slopes.iter_mut().zip(&nodes.base().axes).for_each(|(slope, axis)| *slope /= axis.step);
     root
+}
+
+/// The numbers of `nodes` in a `cell` of the base, each interpolated multilinearly; those of the first axes first, zeros
+/// beyond [`width`]. Never allocates.
+pub(crate) fn linear<N: Levels>(nodes: &N, cell: Cell) -> [f64; MAX_WIDTH] {
+    with_joints!(nodes.base().joints(), D => linear_sum::<N, { 1 << D }, { width(D) }>(nodes, cell))
+}
+
+/// Adds up the levels, each from the `W` numbers at the `C` corners of its cell.
+fn linear_sum<N: Levels, const C: usize, const W: usize>(nodes: &N, mut cell: Cell) -> [f64; MAX_WIDTH] {
+    let mut sums = [0.0; MAX_WIDTH];
+    let mut numbers = [[0.0; C]; W];
+    for level in 0..nodes.count() {
+        if level > 0 {
+            cell.halve();
+        }
+        let gathered = nodes.gather(level, &cell.low, &mut numbers);
+        if !gathered.found {
+            break;
+        }
+        if gathered.any {
+            let weights = cell.weights::<C>();
+            for (sum, numbers) in sums.iter_mut().zip(&numbers) {
+                *sum += numbers.iter().zip(&weights).map(|(number, weight)| weight * number).sum::<f64>();
+            }
+        }
+    }
+    sums
 }
 
 /// The numbers that `level` of `nodes` adds at the corners of its cell with first corner `low`, kind by kind; `None`

@@ -37,6 +37,7 @@ pub use space::{Place, Space, SpaceError};
 use crate::{MAX_JOINTS, dataset::Grid};
 pub(crate) use block::beyond;
 pub use levels::Root;
+use levels::linear;
 pub(crate) use levels::{Gathered, Levels, added, root, with_joints};
 use record::{MAX_WIDTH, mixed, sets, slope, width};
 use space::MOST_BLOCK_JOINTS;
@@ -167,7 +168,7 @@ impl Store {
         if self.blocks.contains_key(&key) {
             return Err(PublishError::Taken { key });
         }
-        let surplus = self.surplus(level, &all, &nodes);
+        let surplus = [self.surplus(level, &all, &nodes), self.slip_surplus(level, &all, &nodes)];
         self.blocks.insert(key, Block::new(nodes, surplus));
         Ok(())
     }
@@ -186,6 +187,23 @@ impl Store {
                 let step: f64 = derivatives.map(|a| self.space.step(0, a)).product();
                 let scale = 0.5_f64.powi((level * set.count_ones()) as i32);
                 surplus[kind] = ((f64::from(record[kind]) * step - below[kind]) * scale) as f32;
+            }
+        }
+        surplus
+    }
+
+    /// The same of the slips. A node that knows of no contact takes what the levels below give there.
+    fn slip_surplus(&self, level: u32, all: &[(usize, Place)], nodes: &Nodes) -> Box<[f32]> {
+        let wide = width(self.space.joints());
+        let below = Slips { store: self, levels: level };
+        let mut surplus = vec![0.0; nodes.slips.len()].into_boxed_slice();
+        let solved =
+            all.iter().filter(|(place, _)| nodes.present >> place & 1 == 1).zip(surplus.chunks_exact_mut(wide));
+        for (((_, node), surplus), slip) in solved.zip(nodes.slips.chunks_exact(wide)) {
+            if slip[0] > 0.0 {
+                let below = linear(&below, self.space.around(level, node));
+                let rows = surplus.iter_mut().zip(slip).zip(below);
+                rows.for_each(|((surplus, slip), below)| *surplus = (f64::from(*slip) - below) as f32);
             }
         }
         surplus
@@ -221,10 +239,23 @@ impl Store {
         levels::root(self, Cell::of(self.base(), q))
     }
 
-    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own (bytes).
+    /// Whether its nodes say how contacts slip.
     #[must_use]
-    pub fn most_bytes(joints: usize, nodes: usize) -> [usize; 2] {
-        let record = size_of::<f32>() * width(joints);
+    pub fn has_slips(&self) -> bool {
+        self.blocks.values().any(|block| !block.nodes.slips.is_empty())
+    }
+
+    /// How contacts slip at `q`, as [`record::slip_of`] has it. Never allocates.
+    #[must_use]
+    pub fn slip(&self, q: &[f64]) -> [f64; MAX_WIDTH] {
+        linear(&Slips { store: self, levels: self.space.levels() }, Cell::of(self.base(), q))
+    }
+
+    /// Memory and file that `nodes` nodes over `joints` joints take at most, each in a block of its own, with their slips
+    /// or without (bytes).
+    #[must_use]
+    pub fn most_bytes(joints: usize, nodes: usize, with_slips: bool) -> [usize; 2] {
+        let record = size_of::<f32>() * width(joints) * (1 + usize::from(with_slips));
         // Numbers of the node and of the interpolation, its gap and status; in the file key and places of the block.
         let memory = size_of::<Block>() + 2 * size_of::<usize>() + 2 * record + size_of::<f32>() + 1;
         let file = 2 * size_of::<u64>() + record + size_of::<f32>() + 1;
@@ -248,6 +279,40 @@ impl Levels for Store {
     }
 
     fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
+        self.gathered(level, low, numbers, Block::surplus_at)
+    }
+}
+
+/// The slips of a store's nodes, up to a level.
+struct Slips<'a> {
+    store: &'a Store,
+    levels: u32,
+}
+
+impl Levels for Slips<'_> {
+    fn base(&self) -> &Grid {
+        self.store.space.base()
+    }
+
+    fn count(&self) -> u32 {
+        self.levels
+    }
+
+    fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
+        self.store.gathered(level, low, numbers, Block::slip_surplus_at)
+    }
+}
+
+impl Store {
+    /// [`Levels::gather`] of the numbers that `surplus_at` gives of a block's node.
+    #[inline(always)]
+    fn gathered<const C: usize, const W: usize>(
+        &self,
+        level: u32,
+        low: &Place,
+        numbers: &mut [[f64; C]; W],
+        surplus_at: impl Fn(&Block, usize, usize) -> Option<&[f32]>,
+    ) -> Gathered {
         let joints = const { C.ilog2() as usize };
         // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
         // the other. With blocks of one node they do so along all axes.
@@ -275,7 +340,7 @@ impl Levels for Store {
         }
         for corner in 0..C {
             let (block, place) = (blocks[corner & odd], (corner ^ odd) & places);
-            match block.and_then(|block| block.surplus_at(place, W)) {
+            match block.and_then(|block| surplus_at(block, place, W)) {
                 Some(surplus) => {
                     gathered.any = true;
                     numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());

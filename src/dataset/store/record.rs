@@ -4,7 +4,7 @@
 //! `w_a` and then `w_ab` for all b < a. Second derivatives along one axis are not among them: Hermite interpolation
 //! does not use them.
 
-use crate::MAX_JOINTS;
+use crate::{MAX_JOINTS, contact::Slip, joint_matrix};
 
 /// Numbers of a node of `joints` joints: 1, 2, 4, 7, 11, 16, 22.
 #[must_use]
@@ -31,6 +31,13 @@ pub const fn mixed(a: usize, b: usize) -> usize {
 pub fn sets(joints: usize) -> impl Iterator<Item = usize> {
     let of_axis = |a: usize| std::iter::once(1 << a).chain((0..a).map(move |b| 1 << a | 1 << b));
     std::iter::once(0).chain((0..joints).flat_map(of_axis))
+}
+
+/// The numbers of a node of `joints` joints that say how its contacts slip, as many as [`width`]: the normal force over
+/// w, and the lower triangle of the slip Jacobian. The ratio is smooth through the boundary of contact, where both end.
+#[must_use]
+pub fn slip_of(slip: &Slip, root: f64, joints: usize) -> Vec<f64> {
+    std::iter::once(slip.normal_force / root).chain(joint_matrix::lower(&slip.jacobian, joints)).collect()
 }
 
 #[cfg(test)]

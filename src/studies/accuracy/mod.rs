@@ -10,12 +10,13 @@
 //! settings of a study take turns.
 
 mod choice;
-mod direct;
 mod grids;
+mod live;
 mod report;
 mod settings;
 
 pub use choice::{Limit, Offer, limits, offers};
+pub use live::LIVE;
 pub use report::{FILES, write_all};
 
 use crate::{
@@ -38,12 +39,12 @@ const SEED: u64 = 0x9e37_79b9_7f4a_7c15;
 pub enum Study {
     /// Grid spacing and interpolation; cost is the bake.
     Spacing,
-    /// Interpolation; cost is a look-up, or with `direct` the share of a solve that falls to a tick, and the tangent.
+    /// Interpolation; cost is a look-up, or live the share of a solve that falls to a tick, and the tangent.
     Lookup,
     /// Tolerance of the contact solver; cost is a configuration.
     Tolerance,
     /// How contact is solved; cost is a configuration.
-    Algorithm,
+    Law,
     /// Mean edge of the object's mesh; cost is a configuration.
     Mesh,
     /// Spacing of contact nodes along links; cost is a configuration.
@@ -183,9 +184,9 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     };
     progress("grid spacing and interpolation");
     let own = grids::spacing(scene, &reference, extent.points, &mut study)?;
-    progress("look-up and direct");
+    progress("look-up and live contact");
     grids::look_up(scene, &own, &mut study)?;
-    direct::live(scene, &model, &reference, &mut study);
+    live::live(scene, &model, &reference, &mut study);
     progress("contact solver, mesh, contact nodes, skin, contact stiffness");
     settings::studies(scene, &reference, &mut study)?;
     Ok(study)

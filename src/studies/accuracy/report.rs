@@ -10,7 +10,7 @@ use crate::{
         plot::{Entry, Mark},
     },
     report::{ReportError, write, write_both},
-    scene::Algorithm,
+    scene::ContactLaw,
 };
 use std::{
     io,
@@ -52,7 +52,7 @@ fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
             Study::Spacing => "spacing",
             Study::Lookup => "look-up",
             Study::Tolerance => "tolerance",
-            Study::Algorithm => "algorithm",
+            Study::Law => "law",
             Study::Mesh => "mesh",
             Study::Links => "link nodes",
             Study::Skin => "skin",
@@ -124,7 +124,7 @@ fn time(accuracy: &Accuracy) -> Canvas {
     let mut sheet = Diagram::new(title, "left: a configuration solved offline; right: a tick of the loop", 1);
     let curves = |study| curves(accuracy, study, |row| (row.cost, row.rms));
     // The energy form at the scene's own tolerance is a dot of the curve of tolerances.
-    let rest = curves(Study::Algorithm).into_iter().filter(|curve| curve.name == Algorithm::Rest.name());
+    let rest = curves(Study::Law).into_iter().filter(|curve| curve.name == ContactLaw::Rest.name());
     let solved = curves(Study::Tolerance).into_iter().chain(rest).collect();
     let left = ("Time of a configuration, over the scene's own [1]".to_owned(), solved);
     let right = ("Time a tick, over linear's look-up [1]".to_owned(), curves(Study::Lookup));

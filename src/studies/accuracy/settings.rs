@@ -2,7 +2,7 @@
 //! and what the scene leaves to choose, which are the object's mesh, the contact nodes along links, the bending
 //! stiffness of the skin and the contact stiffness.
 //!
-//! Tolerance and algorithm err against the reference. The others are varied in steps of a factor, and a row's error is
+//! Tolerance and law err against the reference. The others are varied in steps of a factor, and a row's error is
 //! the distance of its torque from that of the next variant: what one more step changes. If these distances fall as
 //! h^p, the torque converges, and its error is `d / (r^p - 1)` for steps of a factor r. Mesh and nodes have a limit
 //! that they approach as the spacing h falls. The skin approaches that of no bending stiffness, where torque does not
@@ -15,7 +15,7 @@ use crate::{
     contact::{Model, Status},
     object::Object,
     proxy::Chain,
-    scene::{Algorithm, ContactSpec, GroundSpec, GroundStiffness, Scene, Shape, SkinSpec},
+    scene::{ContactLaw, ContactSpec, GroundSpec, GroundStiffness, Scene, Shape, SkinSpec},
     sweep::reference::{Reference, equilibria},
 };
 use toml::{Table, Value};
@@ -45,7 +45,7 @@ struct Variant {
 pub(super) fn studies(scene: &Scene, reference: &Reference, study: &mut Accuracy) -> Result<(), AccuracyError> {
     let studies = [
         (Study::Tolerance, tolerances(scene), ""),
-        (Study::Algorithm, algorithms(scene), ""),
+        (Study::Law, laws(scene), ""),
         (Study::Mesh, meshes(scene), "the object's mesh is varied for spheres alone: another mesh is what it is"),
         (Study::Links, links(scene)?, "the spacing of contact nodes is not varied: no nodes lie along a line"),
         (Study::Skin, skins(scene), "the object has no skin whose bending stiffness could be varied"),
@@ -85,7 +85,7 @@ fn compare(
         answers.iter().map(|(_, found)| found.iter().map(|equilibrium| equilibrium.torque).collect()).collect();
     for (k, Variant { series, setting, value, .. }) in variants.iter().enumerate() {
         let exact = match varied {
-            Study::Tolerance | Study::Algorithm => &reference.exact,
+            Study::Tolerance | Study::Law => &reference.exact,
             // The last variant has no next one.
             _ if k + 1 == variants.len() => break,
             _ => &torques[k + 1],
@@ -118,20 +118,20 @@ fn compare(
 fn tolerances(scene: &Scene) -> Vec<Variant> {
     let variant = |tolerance| {
         let mut scene = scene.clone();
-        scene.contact = ContactSpec { algorithm: Algorithm::Energy, tolerance, ..scene.contact };
-        Variant { scene, series: Algorithm::Energy.name(), setting: format!("{tolerance:.0e}"), value: tolerance }
+        scene.contact = ContactSpec { law: ContactLaw::Following, tolerance, ..scene.contact };
+        Variant { scene, series: ContactLaw::Following.name(), setting: format!("{tolerance:.0e}"), value: tolerance }
     };
     TOLERANCES.into_iter().map(variant).collect()
 }
 
 /// Both laws of contact.
-fn algorithms(scene: &Scene) -> Vec<Variant> {
-    let variant = |algorithm: Algorithm| {
+fn laws(scene: &Scene) -> Vec<Variant> {
+    let variant = |law: ContactLaw| {
         let mut scene = scene.clone();
-        scene.contact.algorithm = algorithm;
-        Variant { scene, series: algorithm.name(), setting: algorithm.name().to_owned(), value: 0.0 }
+        scene.contact.law = law;
+        Variant { scene, series: law.name(), setting: law.name().to_owned(), value: 0.0 }
     };
-    [Algorithm::Energy, Algorithm::Rest].into_iter().map(variant).collect()
+    [ContactLaw::Following, ContactLaw::Rest].into_iter().map(variant).collect()
 }
 
 /// Spheres of other mean edges. Springs keep the stiffness of a continuous shell: between nodes as they are, to the

@@ -54,12 +54,13 @@ impl Judge {
         self.0.errors(answer).0 / self.0.torque
     }
 
-    /// Returns the errors of the torque of `store`.
+    /// Returns the errors of the torque of `store`, and the excess of friction where `model` asks for slips.
     #[must_use]
-    pub fn measure(&self, store: &Store) -> MeasuredError {
+    pub fn measure(&self, store: &Store, model: &Model<'_>) -> MeasuredError {
         let errors = self.0.distances(|q| store.sample(q).torque());
         let interpolation = Interpolation::Potential;
-        self.0.measured(interpolation, vec![InterpolationError::of(interpolation.name(), errors)])
+        let measured = self.0.measured(interpolation, vec![InterpolationError::of(interpolation.name(), errors)]);
+        MeasuredError { friction: self.0.friction_excess(model), ..measured }
     }
 
     /// Replaces equilibria by lower ones that `solvers` reach from the `nodes` around them.

@@ -28,7 +28,7 @@ pub use judge::Judge;
 use super::{
     Lowered,
     lowest::applies,
-    node::Scale,
+    node::{Scale, Solved},
     reference::{REFERENCE_TOLERANCE, tight},
     thin_parts,
 };
@@ -118,7 +118,7 @@ impl Refine<'_> {
         let [seen, unseen] = judges;
         let exact = self.model.with_contact(tight(self.model.contact, REFERENCE_TOLERANCE));
         let solvers = Solvers::new(&exact, rayon::current_num_threads());
-        let lowest = applies(self.model.contact.algorithm);
+        let lowest = applies(self.model.contact.law);
         let mut filling = self.begin(backend, lowest)?;
         let mut rounds = 0;
         loop {
@@ -148,7 +148,8 @@ impl Refine<'_> {
     /// object's nodes as those of `judge` have (bytes).
     #[must_use]
     pub fn filling_bytes(&self, nodes: usize, judge: &Judge) -> usize {
-        (nodes as f64 * held_bytes(width(self.base.joints()), judge.mean_forces())).ceil() as usize
+        let numbers = width(self.base.joints()) * (1 + usize::from(self.model.with_slip));
+        (nodes as f64 * held_bytes(numbers, judge.mean_forces())).ceil() as usize
     }
 
     /// The base alone.
@@ -354,7 +355,8 @@ fn publish(store: &mut Store, held: &HeldNodes, level: u32, nodes: &BTreeSet<Pla
     for ((at, block), published) in &mut blocks {
         for (place, node) in space.nodes(*at, block).filter(|(_, node)| *at == level && nodes.contains(node)) {
             if let Some(held) = held.get(level, &node) {
-                published.push(place, &held.node.record, held.node.result.gap, held.node.result.status);
+                let Solved { record, slip, result, .. } = &held.node;
+                published.push(place, record, slip, result.gap, result.status);
             }
         }
     }

@@ -35,9 +35,9 @@ pub(super) struct Held {
     forces: Vec<(u32, Vec3)>,
 }
 
-/// Memory of a node that is held, with its record and forces on `forces` nodes of the object (bytes).
-pub(super) fn held_bytes(record: usize, forces: f64) -> f64 {
-    let fixed = size_of::<(Point, Held)>() + record * size_of::<f32>();
+/// Memory of a node that is held, with so many numbers and forces on `forces` nodes of the object (bytes).
+pub(super) fn held_bytes(numbers: usize, forces: f64) -> f64 {
+    let fixed = size_of::<(Point, Held)>() + numbers * size_of::<f32>();
     // Tables grow by doubling.
     2.0 * fixed as f64 + forces * size_of::<(u32, Vec3)>() as f64
 }

@@ -17,7 +17,6 @@ const SHARED_NAMES: &[&str] = &[
     "Body",
     "Column",
     "Contact",
-    "Contacts",
     "Course",
     "Files",
     "Frame",

@@ -5,7 +5,7 @@ use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver},
     gpu::{Context, GpuError, GpuSolver},
-    scene::{Algorithm, ContactSpec},
+    scene::{ContactLaw, ContactSpec},
     sweep::Backend,
 };
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ pub const IN_F32: f64 = 3e-4;
 pub struct Processor<'a> {
     /// The GPU; absent: the CPU.
     gpu: Option<&'a Arc<Context>>,
-    law: Algorithm,
+    law: ContactLaw,
     solved: usize,
     left_to_cpu: usize,
 }
@@ -34,12 +34,12 @@ pub fn processors(setting: &Setting) -> Vec<Processor<'_>> {
 impl<'a> Processor<'a> {
     /// All cores.
     pub fn cpu() -> Self {
-        Self { gpu: None, law: Algorithm::Energy, solved: 0, left_to_cpu: 0 }
+        Self { gpu: None, law: ContactLaw::Following, solved: 0, left_to_cpu: 0 }
     }
 
     /// An adapter.
     pub fn gpu(context: &'a Arc<Context>) -> Self {
-        Self { gpu: Some(context), law: Algorithm::Rest, ..Self::cpu() }
+        Self { gpu: Some(context), law: ContactLaw::Rest, ..Self::cpu() }
     }
 
     /// The CPU by the same law.
@@ -63,7 +63,7 @@ impl<'a> Processor<'a> {
     /// Those of the GPU.
     pub fn solve(&mut self, model: &Model<'_>, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, GpuError> {
         self.solved += configurations.len();
-        let model = &model.with_contact(ContactSpec { algorithm: self.law, ..model.contact });
+        let model = &model.with_contact(ContactSpec { law: self.law, ..model.contact });
         let Some(context) = self.gpu else {
             let solve = |solver: &mut Solver<'_>, q: &JointVector| solver.solve(q);
             return Ok(configurations.par_iter().map_init(|| Solver::new(model), solve).collect());

@@ -11,7 +11,7 @@ use haptize::{
     contact::{Model, Solver, Status},
     gpu::{Context, GpuError},
     object::Object,
-    scene::{Algorithm, ContactSpec, SpringKind},
+    scene::{ContactLaw, ContactSpec, SpringKind},
 };
 use rayon::prelude::*;
 use std::{
@@ -203,7 +203,7 @@ fn combination(
     let chains = [floating_bar(0.0), floating_bar(BALL)];
     for (radius, chain) in chains.iter().enumerate() {
         let mut model = Model::new(object, chain, contact_of(chain, 1.0));
-        let mut paper = Model::new(object, chain, ContactSpec { algorithm: Algorithm::Paper, ..contact(1.0) });
+        let mut paper = Model::new(object, chain, ContactSpec { law: ContactLaw::Paper, ..contact(1.0) });
         for (depth, (from, to, _)) in DEPTHS.into_iter().enumerate() {
             let configurations = pressed(&model, 1, count, from * RADIUS, to * RADIUS);
             for (k, &stiffness) in stiffnesses.iter().enumerate() {

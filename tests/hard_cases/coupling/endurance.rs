@@ -40,7 +40,7 @@ pub(super) fn stick_slip(setting: &Setting) -> Result<Vec<CaseResult>, Failure> 
     let seconds = seconds(setting, 10.0, 600.0);
     // A hand so soft that it drags the finger along in jerks.
     let haptics = "[haptics]
-friction = { coefficient = 0.4, static_coefficient = 0.8, stiffness = 2000.0, damping = 0.5 }
+friction = { coefficient = 0.4, static_coefficient = 0.8, stiffness = 2000.0 }
 proxy_damping = [0.2, 2.0]
 device_damping = [1.5, 3.0]
 hand = { stiffness = [600.0, 400.0], damping = [0.2, 20.0], inertia = [0.1, 0.1] }
@@ -66,7 +66,7 @@ hand = { stiffness = [600.0, 400.0], damping = [0.2, 20.0], inertia = [0.1, 0.1]
         let grown = output.accounts.friction_dissipation - taken;
         taken = output.accounts.friction_dissipation;
         least = f64::min(least, grown / output.accounts.exchanged.max(f64::MIN_POSITIVE));
-        // Slipping takes power; a bristle that holds takes next to none.
+        // Slipping takes power; sticking takes next to none.
         let slips_now = grown > 1e-3 * period;
         slips += usize::from(slips_now && stuck);
         stuck = !slips_now;

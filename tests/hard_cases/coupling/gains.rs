@@ -67,12 +67,12 @@ pub(super) fn control_over_a_potential(setting: &Setting) -> Result<Vec<CaseResu
         on_time(&setup, &mut presses(&setup, seconds)?, seconds, &mut watch)?;
         judge(&watch, varied);
     }
-    let effects = "[haptics]\ncontact_damping = 5.0\nfriction = { coefficient = 0.4 }\nfour_channel = {}\n";
+    let effects = "[haptics]\nfriction = { coefficient = 0.4 }\nfour_channel = {}\n";
     let setup = Setup::new(&block(&format!("{effects}{potential}")))?;
     let mut watch = Watch::new(&setup.scene.haptics);
     let places: Vec<(f64, f64)> =
         (0..=(2.0 * seconds) as usize).map(|k| (0.5 * k as f64, if k % 2 == 0 { -0.005 } else { 0.015 })).collect();
     on_time(&setup, &mut way(&setup, &places)?, seconds, &mut watch)?;
-    judge(&watch, "with friction, contact damping and four channels, sliding and pressing");
+    judge(&watch, "with friction and four channels, sliding and pressing");
     Ok(outcomes)
 }

@@ -54,7 +54,7 @@ fn made(joints: usize) -> Vec<u8> {
                 serial += 1;
                 if level == 0 || serial % 3 > 0 {
                     let numbers: Vec<f32> = (0..width(joints)).map(|k| ((serial + k) as f32).sin()).collect();
-                    nodes.push(place, &numbers, 0.25, Status::Contact);
+                    nodes.push(place, &numbers, &[], 0.25, Status::Contact);
                 }
             }
             store.publish(level, &block, nodes).unwrap();

@@ -1,4 +1,4 @@
-//! `direct` beside the look-ups: contact solved live, tick by tick, by the law at rest.
+//! Contact solved live beside the look-ups, tick by tick, by the law at rest.
 //!
 //! To each configuration of the reference a straight way leads, in a random direction of C-space, as fast as the hand
 //! may move. Contact is solved one tick before its end, and there, which is timed. It errs against the same exact
@@ -10,13 +10,16 @@ use crate::{
     contact::{LiveSolver, Model, Status},
     proxy::Chain,
     random::Random,
-    scene::{Interpolation, Scene},
+    scene::Scene,
     sweep::reference::Reference,
 };
 use std::time::Instant;
 
 /// Speed of the proxy's fastest contact node (m/s): a brisk hand. Faster: less is known from the tick before.
 const SPEED: f64 = 0.2;
+
+/// Name of its series.
+pub const LIVE: &str = "live";
 
 /// Seed of the directions.
 const SEED: u64 = 24;
@@ -56,7 +59,7 @@ fn solve(model: &Model<'_>, places: &[JointVector], ways: &[JointVector]) -> (Ve
     (torques, spent / f64::from(contacts.max(1)))
 }
 
-/// Errors and time of `direct`, relative to a look-up of `linear`.
+/// Errors and time of contact solved live, relative to a look-up of `linear`.
 pub(super) fn live(scene: &Scene, model: &Model<'_>, reference: &Reference, study: &mut Accuracy) {
     let model = model.with_contact(scene.contact);
     let (mut random, period) = (Random::new(SEED), 1.0 / scene.haptics.rate);
@@ -71,7 +74,7 @@ pub(super) fn live(scene: &Scene, model: &Model<'_>, reference: &Reference, stud
     let (rms, worst) = reference.errors(|_| answers.next().unwrap_or(zero));
     study.rows.push(Row {
         study: Study::Lookup,
-        series: Interpolation::Direct.name().to_owned(),
+        series: LIVE.to_owned(),
         setting: "every tick".to_owned(),
         value: 1.0,
         points: 0,

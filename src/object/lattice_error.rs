@@ -1,0 +1,102 @@
+//! The error that the cubes of a lattice make, estimated on coarser ones.
+//!
+//! Two lattices whose cubes differ by a factor r differ in compliance by e. Roache's grid convergence index states `3
+//! e / (r^p - 1)` as the error of the finer one, p being the order of convergence (Journal of Fluids Engineering 116,
+//! 1994). Its factor 3 is for two lattices, from which the order cannot be told: it is 2 here, what quadratic elements
+//! have in energy under a pressure whose edge their nodes do not follow. Coarser cubes take a tenth of the work of
+//! those in question; finer ones would take some thirty times as much.
+
+use super::{Compliance, Object, lattice, topology};
+use crate::scene::{ElasticSpec, Material, ObjectSpec};
+use glam::DVec3;
+use serde::Serialize;
+use std::fmt;
+
+/// Size of the coarser cubes, in those of the lattice (1).
+const COARSER: f64 = 1.5;
+
+/// [Roache's](self) factor over `r^p - 1` (1).
+const INDEX: f64 = 3.0 / (COARSER * COARSER - 1.0);
+
+/// Radius of the pressure that both are put under, in mean edges of the surface (1): that of the smallest contact for
+/// which such a surface is fine enough (`docs/solids.md`).
+const RADIUS: f64 = 3.0;
+
+/// Error from which on a warning is due (1): Young's modulus of tissue is hardly known better.
+const LARGE: f64 = 0.05;
+
+/// By how much compliance errs because of the size of the cubes.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LatticeError {
+    /// Size of the cubes (m).
+    pub cell: f64,
+    /// Estimated error of the displacement under a small contact, relative to it (1).
+    pub relative: f64,
+}
+
+impl LatticeError {
+    /// Whether it is large enough to be warned of.
+    #[must_use]
+    pub fn is_large(&self) -> bool {
+        self.relative > LARGE
+    }
+}
+
+impl fmt::Display for LatticeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "cubes of {:.2} mm, by which compliance errs by an estimated {:.1} %",
+            self.cell * 1e3,
+            self.relative * 1e2
+        )?;
+        if self.is_large() {
+            write!(f, ": set object.elasticity.cell = {:.4}", self.cell / 2.0)?;
+        }
+        Ok(())
+    }
+}
+
+impl Object {
+    /// Estimates by how much the lattice in this object, built of `spec`, errs under a pressure around a typical node
+    /// of `compliance`, that of median softness: on corners errors are greater, and contact is rare. None if no lattice
+    /// fills it, or if the coarser one is refused, as where it misses an inclusion.
+    #[must_use]
+    pub fn lattice_error(&self, spec: &ObjectSpec, compliance: &Compliance) -> Option<LatticeError> {
+        let Material::Elastic(elastic) = &spec.material else { return None };
+        let trace = |i: usize| (0..3).map(|k| compliance.block(i, i).col(k)[k]).sum::<f64>();
+        let mut places: Vec<usize> = (0..compliance.nodes.len()).collect();
+        places.sort_by(|&i, &j| trace(i).total_cmp(&trace(j)));
+        let typical = *places.get(places.len() / 2).filter(|_| self.tetrahedra.is_empty())?;
+        let edge = topology::mean_edge(&self.rest, &self.triangles);
+        let cell = elastic.cell.unwrap_or_else(|| lattice::suitable_size(&self.rest, edge));
+        let material = Material::Elastic(ElasticSpec { cell: Some(COARSER * cell), ..elastic.clone() });
+        let coarser = ObjectSpec { material, ..spec.clone() };
+        let coarser = Self::from_surface(&coarser, self.rest.clone(), self.triangles.clone()).ok()?;
+        let forces = self.pressure(compliance.nodes[typical] as usize, RADIUS * edge);
+        let relative = INDEX * (coarser.work(&forces) / self.work(&forces) - 1.0).abs();
+        Some(LatticeError { cell, relative })
+    }
+
+    /// Forces on the surface's nodes of the pressure `(1 - r^2/a^2)^2` around `node`, `a` being `radius` (m).
+    fn pressure(&self, node: usize, radius: f64) -> Vec<DVec3> {
+        let middle = self.rest[node];
+        let mut forces = vec![DVec3::ZERO; self.surface_nodes];
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|node| self.rest[node as usize]);
+            for &node in triangle {
+                let squared = self.rest[node as usize].distance_squared(middle) / (radius * radius);
+                forces[node as usize] -= (1.0 - squared).max(0.0).powi(2) * (b - a).cross(c - a);
+            }
+        }
+        forces
+    }
+
+    /// Work of `forces` on the surface's nodes along the displacement that they cause.
+    fn work(&self, forces: &[DVec3]) -> f64 {
+        let mut moved = vec![DVec3::ZERO; self.moved.len()];
+        self.attachment.spread(forces, &mut moved);
+        self.factor.solve(&mut moved);
+        forces.iter().enumerate().map(|(node, force)| force.dot(self.attachment.follow(node, &moved))).sum()
+    }
+}

@@ -1,0 +1,157 @@
+//! Coulomb friction of the proxy: one spring in C-space that yields, whatever the number of contacts (elastic-plastic,
+//! of the family of Dahl; the map that does not drift is that of Kikuuwe, Takesue, Sano, Mochiyama and Fujimoto 2006).
+//!
+//! With N and B of the contacts ([`crate::contact::Slip`]), the state is a deflection z (m) of `d` numbers, its spring
+//! k, and `rho = mu N / k` the deflection at which it yields. In a step with `dq = T v_hat`
+//!
+//! `z* = z + B dq`,  `z+ = z* min(1, rho / |z*|)`,  `tau = -k B (z + z+) / 2`.
+//!
+//! Sticking, the torque is that of a spring of k B B^T; sliding, its size `|B^-1 tau|` is mu N. mu is static for what
+//! stuck in the last step, which makes a soft hand drag the finger along in jerks, kinetic for what slid.
+//!
+//! *Energy.* The spring keeps `H = k |z|^2 / 2`. With `r = z* - z+` the work of friction on the proxy is
+//! `-k (z + z+)/2 . (z* - z) = -Delta H - k (z + z+)/2 . r`. Sliding, r is parallel to z+ and |z| at most |z+|, so that
+//! the last term takes energy; sticking, r is zero. So friction gives nothing beyond what its spring kept, for any T, N
+//! and B, however they change from step to step. Where rho falls below |z|, z is shortened first, which takes energy,
+//! too.
+//!
+//! *Implicit.* z+ depends on v_hat. `z+ = alpha z*` with alpha = 1 or, where the speed of the step before leads
+//! beyond rho, the ratio `rho / |z*|` at that speed: either makes the torque linear in v_hat, and one solve does. What
+//! comes out beyond rho is shortened afterwards. A step that turns against the predicted one, in which a ratio would
+//! give energy, is solved again with alpha = 1.
+
+use super::{
+    accounts::Extra,
+    npmi::{Load, MidpointInertia, Motion, Npmi, Step},
+};
+use crate::{JointVector, contact::Slip, scene::FrictionSpec};
+
+/// The constants of friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Friction {
+    /// Kinetic and static mu (1).
+    kinetic: f64,
+    stiction: f64,
+    /// k (N/m).
+    stiffness: f64,
+}
+
+/// What friction hands from one step to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FrictionState {
+    /// z (m).
+    deflection: JointVector,
+    /// Whether it slid in the last step.
+    slid: bool,
+}
+
+/// A step of the proxy that is about to be made.
+pub(super) struct Pending<'a> {
+    /// Who makes it.
+    pub npmi: &'a Npmi,
+    /// Inertia in its middle.
+    pub stage: &'a MidpointInertia,
+    /// T (s).
+    pub interval: f64,
+    /// v_hat of the step before (rad/s or m/s).
+    pub velocity: JointVector,
+    /// Forces beside friction.
+    pub load: Load,
+}
+
+impl FrictionState {
+    /// Relaxed.
+    pub fn at_rest(joints: usize) -> Self {
+        Self { deflection: JointVector::zeros(joints), slid: false }
+    }
+}
+
+impl Friction {
+    /// The friction of a scene.
+    pub fn new(spec: &FrictionSpec) -> Self {
+        Self {
+            kinetic: spec.coefficient,
+            stiction: spec.static_coefficient.unwrap_or(spec.coefficient),
+            stiffness: spec.stiffness,
+        }
+    }
+
+    /// The `pending` step of the proxy, whose contacts slip as `slip` says. Books into `extra`. Never allocates.
+    pub fn step(
+        &self,
+        pending: &Pending<'_>,
+        slip: &Slip,
+        state: &mut FrictionState,
+        motion: &mut Motion,
+        extra: &mut Extra,
+    ) -> Step {
+        let &Pending { npmi, stage, interval, velocity, ref load } = pending;
+        let reach = |coefficient| coefficient * slip.normal_force / self.stiffness;
+        let sticking = reach(if state.slid { self.kinetic } else { self.stiction });
+        let mut start = shortened(&state.deflection, sticking);
+        if slip.normal_force <= 0.0 {
+            *state = FrictionState { deflection: start, slid: false };
+            return npmi.advance(stage, motion, interval, load);
+        }
+        let mut alpha = 1.0;
+        let predicted = moved(&start, slip, interval, &velocity);
+        if predicted.dot(&predicted) > sticking * sticking {
+            let kinetic = reach(self.kinetic);
+            start = shortened(&start, kinetic);
+            alpha = (kinetic / moved(&start, slip, interval, &velocity).norm()).min(1.0);
+        }
+        let before = *motion;
+        let solve = |alpha: f64, motion: &mut Motion| {
+            let step = npmi.advance(stage, motion, interval, &self.loaded(load, slip, &start, alpha, interval));
+            let end = moved(&start, slip, interval, &step.velocity);
+            let mut kept = end;
+            kept.iter_mut().for_each(|z| *z *= alpha);
+            (step, end, kept)
+        };
+        let (mut step, mut end, mut kept) = solve(alpha, motion);
+        if alpha < 1.0 && start.dot(&kept) + kept.dot(&kept) < 0.0 {
+            alpha = 1.0;
+            *motion = before;
+            (step, end, kept) = solve(alpha, motion);
+        }
+        let works = (0..start.len()).map(|a| (start[a] + kept[a]) * (end[a] - start[a]));
+        extra.friction_work = -0.5 * self.stiffness * works.sum::<f64>();
+        let slid = alpha < 1.0 || kept.dot(&kept) > sticking * sticking;
+        if slid {
+            kept = shortened(&kept, reach(self.kinetic));
+        }
+        extra.presliding = 0.5 * self.stiffness * kept.dot(&kept);
+        *state = FrictionState { deflection: kept, slid };
+        step
+    }
+
+    /// The load of the step and friction, whose deflection goes from `start` z to `alpha` z*:
+    /// `tau = -k/2 B ((1 + alpha) z + alpha B T v_hat)`.
+    fn loaded(&self, load: &Load, slip: &Slip, start: &JointVector, alpha: f64, interval: f64) -> Load {
+        let mut load = *load;
+        slip.add_damper(0.5 * self.stiffness * interval * alpha, &mut load.damping, start.len());
+        let force = 0.5 * self.stiffness * (1.0 + alpha);
+        for (torque, row) in load.torque.iter_mut().zip(&slip.jacobian) {
+            *torque -= force * start.dot(row);
+        }
+        load
+    }
+}
+
+/// z + B T v (m).
+fn moved(start: &JointVector, slip: &Slip, interval: f64, velocity: &JointVector) -> JointVector {
+    let mut end = *start;
+    end.iter_mut().zip(&slip.jacobian).for_each(|(z, row)| *z += interval * velocity.dot(row));
+    end
+}
+
+/// `deflection`, no longer than `greatest`.
+fn shortened(deflection: &JointVector, greatest: f64) -> JointVector {
+    let mut shorter = *deflection;
+    let square = deflection.dot(deflection);
+    if square > greatest * greatest {
+        let length = square.sqrt();
+        shorter.iter_mut().for_each(|z| *z *= greatest / length);
+    }
+    shorter
+}

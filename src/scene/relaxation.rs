@@ -1,0 +1,42 @@
+//! `[object.relaxation]`: how the object's force fades while it is held.
+
+use super::SceneError;
+use super::check::Checker;
+use super::value::{Range, positive};
+use serde::Deserialize;
+
+/// Most terms of a relaxation (1): two fit ten seconds of real tissue to 2 %.
+pub const MOST_TERMS: usize = 4;
+
+/// Linear viscoelasticity: after a step the share `1 - sum g_i (1 - exp(-t / theta_i))` of the force is left.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RelaxationSpec {
+    /// Share g_i of the force that fades, in sum below one, and the time theta_i in which it does (1, s).
+    pub terms: Vec<[f64; 2]>,
+    /// Distance from a point of contact at which its dent is 1/e as deep: the way over which the arm meets fresh material
+    /// as it slides. Without, what was under the arm stays there (m).
+    #[serde(deserialize_with = "positive", default)]
+    pub dent: Option<f64>,
+}
+
+impl RelaxationSpec {
+    /// Checks it.
+    pub(super) fn check(self, checker: &Checker<'_>) -> Result<Self, SceneError> {
+        let at = |message: String| Err(checker.at("object.relaxation.terms", message));
+        if self.terms.is_empty() || self.terms.len() > MOST_TERMS {
+            return at(format!("terms lists {} terms: it must list 1 to {MOST_TERMS}", self.terms.len()));
+        }
+        for [share, time] in &self.terms {
+            if !(Range::Between(0.0, 1.0).holds(*share) && Range::Positive.holds(*time)) {
+                let message = "a term is a share between 0 and 1 and a positive time in seconds";
+                return at(format!("terms has [{share}, {time}]: {message}"));
+            }
+        }
+        let sum: f64 = self.terms.iter().map(|[share, _]| share).sum();
+        if sum >= 1.0 {
+            return at(format!("the shares of terms sum to {sum}: less than 1, or a dent would never recover"));
+        }
+        Ok(self)
+    }
+}

@@ -1,0 +1,78 @@
+//! Concave and thin bodies, and such as the lattice fits nowhere: compliance converges as the cubes shrink.
+//!
+//! The bodies have no closed form. So cubes of two sizes are compared with finer ones; `docs/solids.md` has the table.
+
+use super::accuracy::compliance;
+use super::*;
+use std::f64::consts::TAU;
+
+/// A torus around z. `radii`: of its middle line and of its tube (m); `counts`: nodes along each.
+fn torus(radii: [f64; 2], counts: [u32; 2]) -> Shell {
+    let at = |i: u32, j: u32| (i % counts[0]) * counts[1] + j % counts[1];
+    let place = |i: u32, j: u32| {
+        let [along, around] = [(i, counts[0]), (j, counts[1])].map(|(k, count)| TAU * f64::from(k) / f64::from(count));
+        let out = radii[0] + radii[1] * around.cos();
+        DVec3::new(out * along.cos(), out * along.sin(), radii[1] * around.sin())
+    };
+    let all = || (0..counts[0]).flat_map(|i| (0..counts[1]).map(move |j| (i, j)));
+    let squares = all().map(|(i, j)| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+    let triangles = squares.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    (all().map(|(i, j)| place(i, j)).collect(), triangles)
+}
+
+/// The mesh of a file beside the shipped scenes, which are in millimetres.
+fn shipped(name: &str, cell: f64) -> Object {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name);
+    let shape = Shape::Mesh { file, scale: 1e-3, centre: DVec3::ZERO, refine: None };
+    Object::build(&spec(shape, elastic(0.45, Some(cell)), bed(1e7))).unwrap()
+}
+
+/// Errors of the compliance with cubes of the first two sizes (m), against those of the third.
+fn errors(name: &str, cells: [f64; 3], (middle, up): (DVec3, DVec3), body: impl Fn(f64) -> Object) -> [f64; 2] {
+    let found = cells.map(|cell| compliance(&body(cell), middle, up));
+    let errors = [0, 1].map(|k| found[k] / found[2] - 1.0);
+    println!("{name}, cubes of {cells:?} m: {:.1} % and {:.1} %", 100.0 * errors[0], 100.0 * errors[1]);
+    errors
+}
+
+/// Two legs of 20 mm at a right angle, pressed near the end of one that stands free.
+#[test]
+fn an_l_bends_alike_with_cubes_of_half_a_leg_and_of_a_sixth() {
+    let body = |cell| {
+        let shell = cubes([24, 12, 24], 0.0025, |at| at[0] < 8 || at[2] < 8);
+        solid(shell, elastic(0.45, Some(cell)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO)
+    };
+    let [coarse, fine] = errors("L", [0.01, 0.005, 0.01 / 3.0], (DVec3::new(0.02, 0.015, 0.05), DVec3::X), body);
+    assert!(coarse.abs() < 0.05 && fine.abs() < 0.02, "{coarse}, {fine}");
+}
+
+/// A plate of 80 x 80 x 10 mm that is clamped along its rim.
+#[test]
+fn a_plate_bends_alike_with_one_cube_and_with_three_across_it() {
+    let body = |cell| {
+        let shell = block([32, 32, 4], 0.0025);
+        let rim = |node: &DVec3| node.x.abs().max(node.y.abs()) > 0.0399;
+        let held = (0..).zip(&shell.0).filter(|(_, node)| rim(node)).map(|(node, _)| node).collect();
+        let ground = GroundSpec { stiffness: GroundStiffness::Clamp, nodes: GroundNodes::Listed(held) };
+        solid(shell, elastic(0.45, Some(cell)), ground, DMat3::IDENTITY, DVec3::ZERO)
+    };
+    let [coarse, fine] = errors("plate", [0.01, 0.005, 0.01 / 3.0], (0.01 * DVec3::Z, DVec3::Z), body);
+    assert!(coarse.abs() < 0.05 && fine.abs() < 0.02, "{coarse}, {fine}");
+}
+
+#[test]
+fn a_torus_a_bean_and_an_organ_err_little_with_cubes_of_the_radius_of_contact() {
+    let ring = |cell| {
+        let shell = torus([0.04, 0.015], [80, 32]);
+        solid(shell, elastic(0.45, Some(cell)), bed(1e7), DMat3::IDENTITY, DVec3::ZERO)
+    };
+    let top = |object: &Object| object.rest.iter().copied().max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+    let on = |name: &'static str| (top(&shipped(name, 0.02)), DVec3::Z);
+    for [coarse, fine] in [
+        errors("torus", [0.01, 0.0067, 0.0045], (DVec3::new(0.04, 0.0, 0.015), DVec3::Z), ring),
+        errors("bean", [0.015, 0.01, 0.0067], on("bean.obj"), |cell| shipped("bean.obj", cell)),
+        errors("organ", [0.015, 0.01, 0.0075], on("organ.obj"), |cell| shipped("organ.obj", cell)),
+    ] {
+        assert!(coarse.abs() < 0.05 && fine.abs() < 0.03, "{coarse}, {fine}");
+    }
+}
