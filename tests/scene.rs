@@ -335,7 +335,7 @@ const BROKEN: &[Broken] = &[
     (
         "stiffness = 1000",
         "stiffness = 1000\nlaw = \"rest\"\nalgorithm = \"paper\"",
-        "algorithm",
+        "[contact]",
         &["duplicate", "`law`"],
     ),
     ("stiffness = 1000", "stiffness = 1000\nsurface = \"round\"", "round", &["facets", "smooth"]),

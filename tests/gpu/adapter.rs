@@ -121,6 +121,6 @@ mod twice {
         }
         let said = String::from_utf8(program(folder.path(), "#1,#3", &["doctor"]).stdout).unwrap();
         assert!(said.contains("none is called \"#3\"") && said.contains(" at #1"), "{said}");
-        assert!(said.contains("haptize bake takes     none\n"), "{said}");
+        assert!(said.contains("haptize bake takes   none\n"), "{said}");
     }
 }
