@@ -139,8 +139,8 @@ const COMMANDS: [&[&str]; 38] = [
 /// Commands whose text is that of the machine, or a file's own: only its JSON is compared.
 const TEXT_APART: [&str; 3] = ["doctor", "completions", "device list"];
 
-/// Lines that depend on how busy the machine is.
-const UNSTEADY: [&str; 2] = ["  late ", "  device "];
+/// How lines begin that depend on how busy the machine is, or hold a hash.
+const UNSTEADY: [&str; 2] = ["  late ", "parts/"];
 
 /// Objects whose keys are not fixed: names of clamps and reasons.
 const OPEN: [&str; 2] = ["clamped", "halted"];
