@@ -54,9 +54,12 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 struct Unfinished(PathBuf);
 
 impl Unfinished {
-    fn begin(path: &Path) -> Self {
-        unfinished().insert(path.to_owned());
-        Self(path.to_owned())
+    /// The file that `make` creates. None is created unlisted, so that [`discard_unfinished`] misses none.
+    fn begin(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<(Self, NamedTempFile)> {
+        let mut unfinished = unfinished();
+        let file = make()?;
+        unfinished.insert(file.path().to_owned());
+        Ok((Self(file.path().to_owned()), file))
     }
 }
 
@@ -138,21 +141,22 @@ impl Replacement {
         if fs::metadata(&path).is_ok_and(|there| there.permissions().readonly()) {
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is there and may not be written to"));
         }
-        let temporary = match growing {
+        let make = || match growing {
             Some(growing) => {
                 clear(growing)?;
-                NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?)
+                Ok(NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?))
             }
             None => {
                 let folder = folder(&path);
                 remove_abandoned(folder);
-                locked_in(folder)?
+                locked_in(folder)
             }
         };
+        let (unfinished, temporary) = Unfinished::begin(make)?;
         // Before anything is written: nobody reads it who may not read the file that it replaces.
         #[cfg(unix)]
         take_over(&path, temporary.as_file());
-        Ok(Self { _unfinished: Unfinished::begin(temporary.path()), path, temporary })
+        Ok(Self { _unfinished: unfinished, path, temporary })
     }
 
     /// A way to write to it; to be flushed before the end.
