@@ -130,7 +130,8 @@ impl Equilibrium {
         Self::vectors(py, self.inspection.proxy_nodes.iter().map(|node| node.position.to_array()))
     }
 
-    /// Contact forces on the arm's nodes (N), shape (nodes, 3).
+    /// Contact forces on the arm's nodes (N), shape (nodes, 3). Before the surface at rest they have a part along it that
+    /// does not act on the object.
     #[getter]
     fn arm_forces(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         let force = |contact: &Contact| contact.force.to_array();
