@@ -154,7 +154,9 @@ impl Bake<'_> {
         }
         sweep.aim_at(aim);
         let error = object.lattice_error(&scene.object, &model.compliance);
-        sweep.warnings.extend(error.filter(LatticeError::is_large).map(|error| error.to_string()));
+        sweep
+            .warnings
+            .extend(error.filter(LatticeError::is_large).map(|error| format!("the lattice is coarse: {error}")));
         let run = Run { chunk: chosen.chunk(), stop, progress };
         work(&mut sweep, &mut chosen, run)
     }
