@@ -235,8 +235,8 @@ impl Detection {
         row_at_rest(model, i, x, &closest).filter(|row| row.depth >= -reach)
     }
 
-    /// The row of the place `x` next to the node, before the feature that is closest to the node, continued beyond its
-    /// ends (m).
+    /// The row of the place `x` next to the node (m), before the feature that is closest to the node, which is continued
+    /// beyond its ends.
     pub fn near_at_rest(&self, model: &Model, i: usize, x: DVec3) -> Option<Contact> {
         let mut closest = self.at_rest[i].closest.filter(|closest| closest.triangle != u32::MAX)?;
         closest.point = model.surface.facet_at_rest(closest.triangle).followed(x, &closest.point);

@@ -36,8 +36,8 @@ pub struct Slip {
 }
 
 impl Slip {
-    /// Returns the slip of `forces` on nodes of `chain` (N), each along its normal, with the joints at `q`. Allocates
-    /// nothing.
+    /// Returns the slip of `forces` on nodes of `chain` (N), whose directions are taken for the normals, with the joints
+    /// at `q`. Allocates nothing. Before the surface at rest a force leans by how its row changes along the surface.
     #[must_use]
     pub fn of(chain: &Chain, q: &[f64], forces: impl IntoIterator<Item = (u32, DVec3)>) -> Self {
         let mut slip = Self::default();

@@ -141,18 +141,19 @@ impl Replacement {
         if fs::metadata(&path).is_ok_and(|there| there.permissions().readonly()) {
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is there and may not be written to"));
         }
-        let make = || match growing {
+        let (unfinished, temporary) = match growing {
             Some(growing) => {
                 clear(growing)?;
-                Ok(NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?))
+                let make =
+                    || Ok(NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?));
+                Unfinished::begin(make)?
             }
             None => {
                 let folder = folder(&path);
                 remove_abandoned(folder);
-                locked_in(folder)
+                locked_in(folder)?
             }
         };
-        let (unfinished, temporary) = Unfinished::begin(make)?;
         // Before anything is written: nobody reads it who may not read the file that it replaces.
         #[cfg(unix)]
         take_over(&path, temporary.as_file());
@@ -203,17 +204,17 @@ pub(super) const PREFIX: &str = ".haptize-";
 pub(super) const SUFFIX: &str = ".tmp";
 
 /// Makes a temporary file in `folder`, locked so that no other process takes it for abandoned.
-fn locked_in(folder: &Path) -> io::Result<NamedTempFile> {
+fn locked_in(folder: &Path) -> io::Result<(Unfinished, NamedTempFile)> {
     loop {
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
         // Like any other new file: readable by whom the umask allows, not by the owner alone.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let file = builder.tempfile_in(folder)?;
+        let (unfinished, file) = Unfinished::begin(|| builder.tempfile_in(folder))?;
         // A file system without locks has no abandoned files that can be recognised.
         if file.as_file().lock().is_err() || file.path().exists() {
-            return Ok(file);
+            return Ok((unfinished, file));
         }
         // Another process has found it before it was locked, and removed it.
     }

@@ -35,7 +35,9 @@ impl RelaxationSpec {
         }
         let sum: f64 = self.terms.iter().map(|[share, _]| share).sum();
         if sum >= 1.0 {
-            return at(format!("the shares of terms sum to {sum}: less than 1, or a dent would never recover"));
+            return at(format!(
+                "the shares of terms sum to {sum:.3}: their sum must be less than 1, or a dent would never recover"
+            ));
         }
         Ok(self)
     }

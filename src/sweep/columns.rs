@@ -110,8 +110,8 @@ impl Columns {
     /// Adds the equilibrium of the next point.
     ///
     /// A result that no file may hold (a number that is not finite, torques of another chain, nodes that the surface
-    /// does not have or out of order, a slip that is asked for and not there) becomes an unconverged point without torque and forces, of residual 1: the empty
-    /// answer, which balances nothing.
+    /// does not have or out of order, a slip that is asked for and not there) becomes an unconverged point without
+    /// torque and forces, of residual 1: the empty answer, which balances nothing.
     pub fn push(&mut self, equilibrium: &Equilibrium, shape: Shape) {
         let on_object = if shape.with_forces { &equilibrium.forces[..] } else { &[] };
         let result = PointResult::of(equilibrium);

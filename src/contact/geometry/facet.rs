@@ -134,8 +134,8 @@ impl Facet {
         best.map_or(ClosestPoint { weights: start, feature: Feature::Face }, |(_, point)| point)
     }
 
-    /// Finds where the closest point `from` of a place next to `x` is for `x`: on the same feature, continued beyond its
-    /// ends, so that it depends smoothly on the place.
+    /// Finds the point closest to `x` on the feature of `from`, which is closest to a place next to `x`. The feature
+    /// is continued beyond its ends, so that the point depends smoothly on `x`.
     #[must_use]
     pub fn followed(&self, x: DVec3, from: &ClosestPoint) -> ClosestPoint {
         let weights = match from.feature {
