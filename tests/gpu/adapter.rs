@@ -18,10 +18,11 @@ fn asking_for_hardware_names_what_was_found_instead() {
 /// Software Vulkan found twice: two adapters that differ in nothing but their number.
 #[cfg(target_os = "linux")]
 mod twice {
+    use crate::common::program::command;
     use haptize::dataset::Dataset;
     use std::{
         path::{Path, PathBuf},
-        process::{Command, Output},
+        process::Output,
     };
 
     /// The file by which the Vulkan loader finds lavapipe.
@@ -39,8 +40,8 @@ mod twice {
     fn program(folder: &Path, named: &str, arguments: &[&str]) -> Output {
         let files = ["one.json", "two.json"].map(|name| folder.join(name));
         files.iter().for_each(|file| assert!(std::fs::copy(lavapipe(), file).unwrap() > 0));
-        let mut command = Command::new(env!("CARGO_BIN_EXE_haptize"));
-        command.current_dir(folder).args(arguments).env("WGPU_ADAPTER_NAME", named);
+        let mut command = command(folder, arguments);
+        command.env("WGPU_ADAPTER_NAME", named);
         for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
             command.env(variable, std::env::join_paths(&files).unwrap());
         }

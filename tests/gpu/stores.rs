@@ -1,5 +1,6 @@
 //! Stores that are filled on the GPU, against those that the CPU fills.
 
+use crate::common::program::json;
 use crate::fixture::{context, load};
 use haptize::{
     contact::Model,
@@ -12,7 +13,7 @@ use haptize::{
         refine::{Judge, Refine, Refined},
     },
 };
-use std::{path::Path, process::Command, time::Instant};
+use std::{path::Path, time::Instant};
 
 /// Agreement of energies and torques at nodes, over their rms (1): f32 places the arm to some 1e-5 of the depths.
 const AGREEMENT: f64 = 1e-4;
@@ -82,11 +83,8 @@ fn a_refined_bake_names_the_gpu_that_solved() {
     let scene = include_str!("../scenes/small.toml");
     std::fs::write(folder.path().join("small.toml"), scene).unwrap();
     let bake = |backend: &str| -> serde_json::Value {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_haptize"));
-        program.current_dir(folder.path()).args(["bake", "small.toml", "--max-error", "5%", "--refine", "2"]);
-        let output = program.args(["--backend", backend, "--json"]).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
+        let bake = ["bake", "small.toml", "--max-error", "5%", "--refine", "2", "--backend", backend, "--json"];
+        json(folder.path(), &bake)
     };
     let [gpu, cpu] = ["gpu", "cpu"].map(|backend| {
         let report = bake(backend);
