@@ -11,7 +11,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # Cargo calls this script itself for each crate of the workspace: with the compiler and its arguments.
 if [[ ${1:-} == *rustc* ]]; then
     case " $* " in
-    *' --crate-name haptize '*' --crate-type lib '* | *' --crate-name cli '*)
+    *' --crate-name haptize '*' --crate-type lib '* | *' --crate-name reliability '*)
         exec "$@" -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=3 \
             -Cllvm-args=-sanitizer-coverage-inline-8bit-counters ;;
     # The program has the library's counters, and nobody who reads them.
@@ -27,4 +27,4 @@ echo 'void __sanitizer_cov_8bit_counters_init(char *first, char *end) { (void)fi
     cc -x c -c -o "$place/no_counters.o" -
 export HAPTIZE_FUZZ_LINK=$place/no_counters.o
 export RUSTC_WORKSPACE_WRAPPER=$PWD/tests/fuzz.sh
-HAPTIZE_FUZZ=$executions cargo test --locked --workspace -p haptize --features viewer --test cli -- reliability::fuzz --nocapture --test-threads 1
+HAPTIZE_FUZZ=$executions cargo test --locked --workspace -p haptize --features viewer --test reliability -- fuzz --nocapture --test-threads 1

@@ -1,4 +1,4 @@
-//! The program as a user meets it: commands, what they print, scenes and robots that they read, figures, and that nothing is lost.
+//! The program as a user meets it: commands, what they print, scenes and robots that they read, and figures.
 
 // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -9,7 +9,6 @@ mod common;
 mod device_scenes;
 mod docs;
 mod printed;
-mod reliability;
 mod report;
 mod scene;
 mod urdf;

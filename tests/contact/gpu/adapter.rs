@@ -73,7 +73,7 @@ mod twice {
     #[test]
     fn a_bake_on_two_adapters_has_the_bits_of_one() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("small.toml"), include_str!("../scenes/small.toml")).unwrap();
+        std::fs::write(folder.path().join("small.toml"), include_str!("../../scenes/small.toml")).unwrap();
         let bake = |named, file: &str| {
             let arguments = [
                 "bake",
@@ -113,7 +113,7 @@ mod twice {
     #[test]
     fn one_name_in_vain_is_an_error_beside_one_that_is_there() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("small.toml"), include_str!("../scenes/small.toml")).unwrap();
+        std::fs::write(folder.path().join("small.toml"), include_str!("../../scenes/small.toml")).unwrap();
         for backend in ["auto", "gpu"] {
             let output =
                 program(folder.path(), "#1,#3", &["bake", "small.toml", "--law", "rest", "--backend", backend]);

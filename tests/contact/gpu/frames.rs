@@ -1,6 +1,6 @@
 //! The frame update of the object's nodes against its twin on the CPU.
 
-use crate::fixture::{context, load, load_of};
+use super::fixture::{context, load, load_of};
 use glam::DVec3;
 use haptize::{
     gpu::{FrameMethod, FrameUpdate},

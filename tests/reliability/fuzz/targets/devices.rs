@@ -1,7 +1,7 @@
 //! How devices stand to a scene's arm, and what they say on a serial line.
 
 use super::{Target, mutate};
-use crate::reliability::objects;
+use crate::objects;
 use haptize::{
     JointVector,
     device::{

@@ -1,6 +1,6 @@
 //! Equilibria of the GPU backend against the CPU's.
 
-use crate::fixture::{context, load, load_of, on_grid};
+use super::fixture::{context, load, load_of, on_grid};
 use glam::DVec3;
 use haptize::{
     JointVector,

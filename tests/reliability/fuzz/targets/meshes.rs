@@ -1,7 +1,7 @@
 //! Files of meshes and of robots.
 
 use super::{Target, mutate, outcome, shipped, write};
-use crate::reliability::objects;
+use crate::objects;
 use glam::DVec3;
 use haptize::{
     object::Object,

@@ -11,7 +11,7 @@ pub use meshes::{MSH, OBJ, PLY, ROBOTS, STL};
 pub use stores::STORES;
 
 use super::mutate::{self, Random};
-use crate::reliability::objects;
+use crate::objects;
 use haptize::{
     dataset::{Dataset, JointLabel},
     device::Motion,

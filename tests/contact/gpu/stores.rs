@@ -1,7 +1,7 @@
 //! Stores that are filled on the GPU, against those that the CPU fills.
 
+use super::fixture::{context, load};
 use crate::common::program::json;
-use crate::fixture::{context, load};
 use haptize::{
     contact::Model,
     dataset::Dataset,
@@ -80,7 +80,7 @@ fn a_store_that_the_gpu_fills_is_the_cpus() {
 #[test]
 fn a_refined_bake_names_the_gpu_that_solved() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = include_str!("../scenes/small.toml");
+    let scene = include_str!("../../scenes/small.toml");
     std::fs::write(folder.path().join("small.toml"), scene).unwrap();
     let bake = |backend: &str| -> serde_json::Value {
         let bake = ["bake", "small.toml", "--max-error", "5%", "--refine", "2", "--backend", backend, "--json"];
