@@ -143,6 +143,12 @@ impl Scene {
         Ok(scene)
     }
 
+    /// Whether `path` names a scene rather than a dataset: by its ending, `.toml`.
+    #[must_use]
+    pub fn is_at(path: &Path) -> bool {
+        path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+    }
+
     /// Whether the loop interpolates torque with its tangent d tau/d q, so that each equilibrium is to come with it.
     #[must_use]
     pub fn uses_tangent(&self) -> bool {
