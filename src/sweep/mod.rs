@@ -54,7 +54,6 @@ pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use lowest::Lowered;
 pub use measured::MOST_CONFIGURATIONS;
 pub use merge::{Merge, MergeError, Merged};
-pub use node::{NoEnergy, check_law};
 pub use pilot::{Aim, AimError, Choice, Cost, Pilot, PilotError, Prospect, Trial};
 pub use placing::Placing;
 pub use plan::{Plan, ShardCost};

@@ -19,7 +19,7 @@ use crate::{
 use std::{
     error::Error,
     fmt,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -218,7 +218,7 @@ fn run(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Loaded, Option<Body>), Failure> {
     let loaded = match task {
-        Task::Open(path) if is_scene(&path) => Loaded::live(Scene::load(&path)?)?,
+        Task::Open(path) if Scene::is_at(&path) => Loaded::live(Scene::load(&path)?)?,
         Task::Open(path) => {
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
@@ -227,11 +227,6 @@ fn run(
     };
     let body = Body::new(context, &loaded, &loaded.tuning().graphics)?;
     Ok((loaded, body))
-}
-
-/// Scenes end in .toml; everything else is taken for a dataset, whose reader says what it is not.
-fn is_scene(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
 fn bake(
