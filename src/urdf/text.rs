@@ -24,7 +24,8 @@ const TIP_FORCE: f64 = 10.0;
 /// `command`: what made it, for the head of the file.
 ///
 /// # Errors
-/// [`UrdfError::Scene`] if the text is no valid scene, a fault of this program.
+/// [`UrdfError::Request`] if there is no contact node, [`UrdfError::Scene`] if the text is no valid scene, a fault of
+/// this program.
 pub fn write_scene(
     robot: &Robot,
     arm: &Arm,
@@ -33,7 +34,11 @@ pub fn write_scene(
     command: &str,
 ) -> Result<String, UrdfError> {
     let proxy = proxy(arm, nodes);
-    let practice = Practice::new(&Chain::new(&proxy));
+    let no_nodes = || UrdfError::Request {
+        path: robot.path.clone(),
+        message: "the arm has no contact node, and could touch nothing".into(),
+    };
+    let practice = Practice::new(&Chain::new(&proxy)).ok_or_else(no_nodes)?;
     let mut text = String::new();
     // Writing to a string fails only where memory does.
     let _ = write(&mut text, robot, arm, &proxy, nodes, &practice, command);
@@ -107,8 +112,7 @@ fn write(
     entry(text, "stiffness", "200.0", "N/m, of one contact spring; each node has three")?;
 
     let Practice { press, .. } = practice;
-    let lines: Vec<String> = press.axes.iter().map(|(_, lines)| lines.to_string()).collect();
-    heading(text, &format!("C-space: {} = {} configurations", lines.join(" x "), press.points()))?;
+    heading(text, "C-space: where contact is baked")?;
     writeln!(
         text,
         "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with \
@@ -135,7 +139,7 @@ fn write_head(text: &mut String, robot: &Robot, arm: &Arm, joints: usize, comman
     writeln!(text, "#     {}", comment(command))?;
     writeln!(
         text,
-        "# against a soft ball, which is there for a start: put your own object in its place, delete\n# [grid] and [motion], and let `haptize place SCENE --write` make them anew.\n#"
+        "# against a soft ball, which is there for a start: `haptize place SCENE --mesh FILE --write` puts your own object\n# in its place, and grid and motions there.\n#"
     )?;
     writeln!(text, "# All quantities are SI: m, rad, N, kg, s. Every key is explained in datasets/README.md.")?;
     if !arm.notes.is_empty() {
