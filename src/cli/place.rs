@@ -43,7 +43,7 @@ pub struct Arguments {
     #[arg(long, value_name = "X,Y,Z", value_parser = point, requires = "mesh", allow_hyphen_values = true)]
     turn: Option<DVec3>,
     /// Young's modulus of the object (Pa); by default that of a healthy liver.
-    #[arg(long, value_name = "PASCALS", default_value_t = YOUNG, value_parser = young, requires = "mesh")]
+    #[arg(long, value_name = "PASCALS", default_value_t = YOUNG, value_parser = young, requires = "mesh", allow_negative_numbers = true)]
     young: f64,
     /// Write grid and motions into the scene, and the object where it is another or moved. They replace those that are
     /// there; other lines and their comments stay.

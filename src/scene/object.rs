@@ -515,3 +515,18 @@ impl GroundTable {
         Ok(GroundSpec { stiffness, nodes })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn coordinates_are_scaled_then_turned_about_x_y_and_z_then_moved() {
+        let placement = Placement { scale: 2.0, turn: DVec3::new(FRAC_PI_2, 0.0, FRAC_PI_2), centre: DVec3::X };
+        let placed = placement.place(vec![DVec3::X, DVec3::Y, DVec3::Z]);
+        // About x, y goes to z and z to -y; then about z, x goes to y and -y to x.
+        let expected = [DVec3::new(1.0, 2.0, 0.0), DVec3::new(1.0, 0.0, 2.0), DVec3::new(3.0, 0.0, 0.0)];
+        placed.iter().zip(expected).for_each(|(x, expected)| assert!(x.distance(expected) < 1e-12, "{placed:?}"));
+    }
+}
