@@ -32,7 +32,7 @@ fn haptized(name: &str, part: impl FnOnce(&mut WorkspacePlan)) -> Dataset {
     let PlanSpec::Workspace(plan) = &mut scene.scan.plan else { unreachable!() };
     part(plan);
     let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain).unwrap();
+    let plan = Plan::new(&scene.scan, &chain).unwrap();
     let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, plan.stops[0].q, SEED);
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("log.csv");

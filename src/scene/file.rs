@@ -73,9 +73,10 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     let proxy = table.proxy.check(checker)?;
     let joints = &proxy.joints;
     let mut object = take(&mut table.object);
+    let is_measured = table.contact.is_none() && object.as_ref().is_some_and(ObjectTable::is_measured);
     let relaxation = object.as_mut().and_then(|object| object.relaxation.take());
     let relaxation = relaxation.map(|relaxation| relaxation.check(checker)).transpose()?;
-    let object = object.map(|object| object.check(checker)).transpose()?;
+    let object = object.filter(|_| !is_measured).map(|object| object.check(checker)).transpose()?;
     // A virtual object is drawn unless the scene says no; a real one moves by no forces that are known.
     let graphics = match table.graphics {
         Some(GraphicsEntry::Loop(graphics)) => Some(graphics),
@@ -84,10 +85,10 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     };
     graphics.map_or(Ok(()), |graphics| graphics.check(checker, object.as_ref()))?;
     let mut haptics = take(&mut table.haptics);
-    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
-    // energy.
+    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has an
+    // energy where it was learnt how the object relaxes.
     let solved = table.contact.as_ref().is_some_and(|contact| contact.law != Some(ContactLaw::Paper));
-    if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
+    if !(checker.has("haptics.interpolation") || is_measured || object.is_some() && solved) {
         haptics.interpolation = Interpolation::Linear;
     }
     if relaxation.is_some() && !haptics.interpolation.is_potential() {

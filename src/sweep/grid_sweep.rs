@@ -145,6 +145,7 @@ impl<'a> Sweep<'a> {
                 notices: Vec::new(),
                 error: None,
                 mesh_ripple: None,
+                relaxation: None,
                 aim: None,
             },
             skin: object.skin,
