@@ -10,7 +10,7 @@ use super::{
 use crate::{
     MAX_JOINTS,
     csv::TableError,
-    dataset::{Axis, Dataset, IdentifiedRelaxation},
+    dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
         GridizeOptions, GridizeReport, History, Interpolation, Past, Samples, gridize, gridize_remembering,
         predict_histories,
@@ -18,9 +18,10 @@ use crate::{
     },
     input,
     logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
+    proxy::Chain,
     report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
-    scan::{RowStatus, ScanLog},
+    scan::{RowStatus, ScanLog, add_slip, identify_friction},
     scene::{Rendering, ScanScene},
     toml_text::{self, coarse, significant},
 };
@@ -103,6 +104,8 @@ pub struct Source {
     left_out: usize,
     /// What tells how the object relaxes, where something does.
     past: Option<(Vec<History>, Past)>,
+    /// Friction of the object, and the arm and its node that felt it.
+    friction: Option<(IdentifiedFriction, Chain, usize)>,
 }
 
 impl Source {
@@ -114,8 +117,12 @@ impl Source {
             None => gridize(&self.samples, options)?,
         };
         dataset.scene.clone_from(&self.scene);
-        if let (Some(found), false) = (&dataset.provenance.relaxation, self.scene.is_empty()) {
-            dataset.scene += &relaxing(found)?;
+        if let Some((friction, chain, node)) = &self.friction {
+            add_slip(&mut dataset, chain, *node);
+            dataset.provenance.friction = Some(*friction);
+        }
+        if !self.scene.is_empty() {
+            dataset.scene += &identified(&dataset.provenance)?;
             Rendering::parse(&dataset.scene, "scene")?;
         }
         dataset.provenance.backend = self.kind.to_owned();
@@ -186,6 +193,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         held_out,
         against: against.transpose()?,
         relaxation: dataset.provenance.relaxation.clone(),
+        friction: dataset.provenance.friction,
         history_misfit,
         folder: folder.map(|folder| folder.close(&figures)).transpose()?,
         figures: report::names(&figures),
@@ -217,6 +225,9 @@ struct Gridized {
     /// How the object relaxes.
     #[serde(skip_serializing_if = "Option::is_none")]
     relaxation: Option<IdentifiedRelaxation>,
+    /// Its friction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    friction: Option<IdentifiedFriction>,
     /// Predicted less measured over measured torque of other logs in which it relaxes, rms (1).
     #[serde(skip_serializing_if = "Option::is_none")]
     history_misfit: Option<f64>,
@@ -232,13 +243,19 @@ struct Gridized {
     axes: Vec<Axis>,
 }
 
-/// The lines of a scene whose object relaxes as was `found`.
-fn relaxing(found: &IdentifiedRelaxation) -> Result<String, std::fmt::Error> {
+/// The lines of a scene that name what was identified of its object.
+fn identified(provenance: &Provenance) -> Result<String, std::fmt::Error> {
     let mut text = String::new();
-    toml_text::heading(&mut text, "Identified by haptize gridize")?;
-    text += "[object.relaxation]\n";
-    let term = |[share, time]: &[f64; 2]| format!("[{}, {}]", significant(*share), significant(*time));
-    toml_text::entry(&mut text, "terms", &toml_text::list(&found.terms, term), "share of the force, and time [s]")?;
+    if let Some(found) = &provenance.relaxation {
+        toml_text::heading(&mut text, "Identified by haptize gridize")?;
+        text += "[object.relaxation]\n";
+        let term = |[share, time]: &[f64; 2]| format!("[{}, {}]", significant(*share), significant(*time));
+        toml_text::entry(&mut text, "terms", &toml_text::list(&found.terms, term), "share of the force, and time [s]")?;
+    }
+    if let Some(found) = &provenance.friction {
+        text += "\n[haptics.friction]\n";
+        toml_text::entry(&mut text, "coefficient", &significant(found.coefficient), "identified by haptize gridize")?;
+    }
     Ok(text)
 }
 
@@ -317,7 +334,12 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
     let left_out = left_out.count();
     let histories = log.histories();
     let kind = if log.header.simulated { "simulated scan" } else { "scan" };
-    let epsilon = Some(ScanScene::parse(&log.header.scene, path)?.scan.control.epsilon);
+    let scene = ScanScene::parse(&log.header.scene, path)?;
+    let epsilon = Some(scene.scan.control.epsilon);
+    let chain = Chain::new(&scene.proxy);
+    let friction = identify_friction(&log, &scene.scan, &chain);
+    let node = scene.scan.plan.node(chain.nodes.len());
+    let friction = friction.map(|friction| (friction, chain, node));
     Ok(Source {
         samples: log.samples(),
         scene: log.header.scene,
@@ -328,6 +350,7 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
         branches: None,
         left_out,
         past: (!histories.is_empty()).then_some((histories, Past::Presses)),
+        friction,
     })
 }
 
@@ -350,6 +373,7 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
         branches: branches.map(|branches| (branches, mapping.lead())),
         left_out,
         past: (!histories.is_empty()).then_some((histories, Past::Log)),
+        friction: None,
     })
 }
 
@@ -378,6 +402,13 @@ impl Describe for IdentifiedRelaxation {
                 out.unwrap_or_default()
             ),
         );
+    }
+}
+
+impl Describe for IdentifiedFriction {
+    fn describe(&self, text: &mut Text) {
+        let Self { coefficient, strokes, deviation } = self;
+        text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes to and fro"));
     }
 }
 
@@ -424,6 +455,7 @@ impl Describe for Gridized {
             }
         }
         self.relaxation.describe(text);
+        self.friction.describe(text);
         if let Some(misfit) = self.history_misfit {
             text.row("against", format_args!("memory included, to {:.1} % of the torque, rms", 100.0 * misfit));
         }

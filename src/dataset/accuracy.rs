@@ -43,6 +43,17 @@ pub struct IdentifiedRelaxation {
     pub held_out: Option<f64>,
 }
 
+/// Friction of a measured object, identified from recorded strokes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiedFriction {
+    /// Tangential over normal force while slipping (1).
+    pub coefficient: f64,
+    /// Strokes to and fro that it is the mean of.
+    pub strokes: usize,
+    /// Standard deviation from stroke to stroke (1).
+    pub deviation: f64,
+}
+
 /// Difference of contact with the surface at rest from contact with the deformed surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GeometryError {

@@ -23,7 +23,9 @@ mod stored;
 mod summary;
 mod surface;
 
-pub use accuracy::{FrictionExcess, GeometryError, IdentifiedRelaxation, InterpolationError, MeasuredError};
+pub use accuracy::{
+    FrictionExcess, GeometryError, IdentifiedFriction, IdentifiedRelaxation, InterpolationError, MeasuredError,
+};
 pub(crate) use atomic::BUFFER;
 pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
 pub use claim::Claim;
@@ -149,6 +151,9 @@ pub struct Provenance {
     /// How the measured object relaxes, where that was identified.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<IdentifiedRelaxation>,
+    /// Its friction, likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<IdentifiedFriction>,
     /// Where the grid was chosen for an error, that error: rms, over the rms of the torque (1).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aim: Option<f64>,

@@ -55,7 +55,7 @@ pub enum Past {
 /// [presses](Past::Presses), `samples` at rest; the dataset's provenance says how it fades.
 ///
 /// # Errors
-/// Those of [`gridize`]; or when no term of relaxation is found.
+/// Those of [`gridize`]; when no history lies inside the grid, and when a log shows no relaxation.
 pub fn gridize_remembering(
     samples: &Samples,
     (histories, past): (&[History], Past),
@@ -70,8 +70,11 @@ pub fn gridize_remembering(
     for _ in 0..ROUNDS {
         let (mut dataset, report) = with_energy(&samples, options)?;
         let stretches = stretches(&dataset, histories)?;
-        let found = identify(&stretches, MOST_TERMS, scaled).filter(|found| !found.terms.is_empty());
-        let found = found.ok_or(GridizeError::NoRelaxation)?;
+        let found = identify(&stretches, MOST_TERMS, scaled).ok_or(GridizeError::NoHistory)?;
+        if found.terms.is_empty() {
+            // An object that does not relax is as it was measured at rest.
+            return if scaled { Ok((dataset, report)) } else { Err(GridizeError::NoRelaxation) };
+        }
         if scaled || found.is_near(&last, SETTLED) {
             scale(&mut dataset, found.scale);
             dataset.provenance.relaxation = Some(IdentifiedRelaxation {

@@ -180,6 +180,12 @@ pub enum GridizeError {
         /// The limit.
         limit: usize,
     },
+    /// Nothing of the histories can be compared.
+    #[error(
+        "no history has rows that count inside the grid: take a smaller step, so that it reaches farther, or record in \
+         the middle of the range"
+    )]
+    NoHistory,
     /// Nothing fades.
     #[error(
         "no relaxation is found: the torque does not fade measurably while the object is held; leave it out, or hold \

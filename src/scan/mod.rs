@@ -7,6 +7,7 @@
 //! [`simulated`] one, which touches no real object, and every log and dataset made with it says so; or a real one.
 
 mod controller;
+mod friction;
 mod log;
 mod pd_control;
 mod plan;
@@ -15,6 +16,7 @@ mod steady;
 mod trajectory;
 
 pub use controller::GRAVITY;
+pub use friction::{add_slip, identify_friction};
 pub use log::{LogError, LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
 pub use pd_control::{PdControl, PdOutput};
 pub use plan::{Plan, Recorded, Stop};

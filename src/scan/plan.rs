@@ -175,6 +175,8 @@ fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Pla
         let (Some(history), Some(bottom)) = (spec.history.as_ref().filter(|_| is_recorded(line)), bottom) else {
             continue;
         };
+        // The device's own viscous friction is least in slow strokes.
+        let slowest = history.speeds.iter().copied().fold(f64::INFINITY, f64::min);
         for (press, &speed) in history.speeds.iter().enumerate() {
             let point = Some(points + result.histories);
             result.histories += 1;
@@ -184,7 +186,7 @@ fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Pla
             record(bottom, speed, history.hold);
             if press == 0 && history.stroke > 0.0 {
                 for side in plan.across.iter().flat_map(|axis| STROKES.map(|share| axis.direction * share)) {
-                    record(bottom + side * history.stroke, spec.control.speed, 0.0);
+                    record(bottom + side * history.stroke, slowest, 0.0);
                 }
             }
             record(back, speed, 0.0);

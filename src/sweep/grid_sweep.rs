@@ -146,6 +146,7 @@ impl<'a> Sweep<'a> {
                 error: None,
                 mesh_ripple: None,
                 relaxation: None,
+                friction: None,
                 aim: None,
             },
             skin: object.skin,

@@ -69,6 +69,7 @@ fn sample() -> Dataset {
                 misfit: 0.01,
                 held_out: Some(0.02),
             }),
+            friction: Some(haptize::dataset::IdentifiedFriction { coefficient: 0.4, strokes: 6, deviation: 0.02 }),
             aim: None,
         },
     }
