@@ -56,9 +56,14 @@ pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result
         return Err(checker.error(0..0, message));
     };
     let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, &mut table)?;
-    if haptics.friction.is_some() {
-        let message = "friction needs to know how contacts slip, which a real object does not tell: leave it out";
-        return Err(checker.at("haptics.friction", message));
+    for (named, key) in
+        [(haptics.friction.is_some(), "haptics.friction"), (haptics.relaxation.is_some(), "object.relaxation")]
+    {
+        if named {
+            let message = "what a real object holds back and remembers is identified from [scan.history], not named: leave \
+                           it out";
+            return Err(checker.at(key, message));
+        }
     }
     Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }
