@@ -371,6 +371,11 @@ fn grounded<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Vec<u32>>, D::
 }
 
 impl ObjectTable {
+    /// Whether it describes nothing of the object but what a measurement tells: how it relaxes.
+    pub fn is_measured(&self) -> bool {
+        self.relaxation.is_some() && self.sphere.is_none() && self.mesh.is_none() && self.tetrahedra.is_none()
+    }
+
     /// The object.
     pub fn check(self, checker: &Checker<'_>) -> Result<ObjectSpec, SceneError> {
         let Self { sphere, mesh, tetrahedra, springs, elasticity, skin, ground, node_mass, node_damping, .. } = self;
