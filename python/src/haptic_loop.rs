@@ -39,7 +39,7 @@ impl Loop {
     #[pyo3(signature = (dataset, gains = None))]
     fn new(py: Python<'_>, dataset: &Bound<'_, Dataset>, gains: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let dataset = &dataset.get().dataset;
-        let setup = threads::detach(py, || Setup::new(dataset))?.map_err(|error| errors::setup(py, &error))?;
+        let setup = threads::detach(py, || Setup::new(dataset))?.map_err(|error| errors::dataset(py, &error))?;
         let (haptics, advice) = match gains {
             None => (setup.haptics, setup.advice),
             Some(gains) => {
@@ -50,7 +50,7 @@ impl Loop {
                     spec.set_gain(&key, &values).map_err(|error| PyValueError::new_err(error.to_string()))?;
                 }
                 let retuned = threads::detach(py, || setup.retuned(dataset, &spec))?;
-                let retuned = retuned.map_err(|error| errors::setup(py, &error))?;
+                let retuned = retuned.map_err(|error| errors::dataset(py, &error))?;
                 (Arc::new(retuned.0), retuned.1)
             }
         };

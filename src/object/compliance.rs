@@ -192,6 +192,6 @@ mod tests {
         Factor::of(&stiffness, 0.25, &diagonal).unwrap().solve(&mut vectors);
         assert!(vectors.iter().zip(&solution).all(|(a, b)| (*a - *b).length() < 1e-13));
         let indefinite = Factor::of(&stiffness, 1.0, &[-100.0; 6]);
-        assert_eq!(indefinite.unwrap_err(), crate::object::FactorError::NotPositiveDefinite);
+        assert_eq!(indefinite.unwrap_err().kind(), crate::ErrorKind::Indefinite);
     }
 }

@@ -1,7 +1,6 @@
 //! Why an object is refused, and what to do about it.
 
-use super::FactorError;
-use crate::memory::Shortage;
+use crate::{Error, memory::Shortage};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -193,7 +192,13 @@ pub enum ObjectError {
     },
     /// The factorisation failed for a reason other than the object's.
     #[error(transparent)]
-    Factor(#[from] FactorError),
+    Factor(#[from] Error),
+}
+
+impl From<ObjectError> for Error {
+    fn from(error: ObjectError) -> Self {
+        Self::new(error.to_string())
+    }
 }
 
 /// A defect that keeps triangles from being a closed, orientable surface of proper triangles.

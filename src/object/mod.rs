@@ -36,7 +36,7 @@ pub use attachment::Attachment;
 pub use body::Body;
 pub use compliance::Compliance;
 pub use error::{ObjectError, SurfaceDefect};
-pub use factor::{Factor, FactorError};
+pub use factor::Factor;
 pub(crate) use icosphere::generate as icosphere;
 pub(crate) use import::{MOST_METRES, length, read as read_surface};
 pub use lattice_error::LatticeError;

@@ -4,10 +4,9 @@
 //! line, every other row of lines backwards so that neighbours in time are neighbours in space. A plan over joints goes
 //! through its grid row by row, every other row backwards.
 
-use super::ScanError;
 use crate::proxy::inverse_kinematics::reach;
 use crate::{
-    JointVector,
+    Error, JointVector, error,
     proxy::Chain,
     scene::{PlanSpec, WorkspacePlan},
 };
@@ -15,6 +14,10 @@ use glam::DVec3;
 
 /// Most points of a scan: at a second a point, eleven days.
 const SCAN_POINTS: usize = 1_000_000;
+
+/// What is wrong with a plan of which nothing can be reached.
+const NOTHING_REACHABLE: &str =
+    "the joints reach no point of the plan: check its start, directions and the joints' limits";
 
 /// One stop of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +45,7 @@ impl Plan {
     ///
     /// # Errors
     /// When it has too many points, or the joints reach none of them.
-    pub fn new(spec: &PlanSpec, chain: &Chain) -> Result<Self, ScanError> {
+    pub fn new(spec: &PlanSpec, chain: &Chain) -> Result<Self, Error> {
         let plan = match spec {
             PlanSpec::Workspace(plan) => workspace(plan, chain, spec.node(chain.nodes.len()))?,
             PlanSpec::Joints(grid) => {
@@ -58,7 +61,7 @@ impl Plan {
             }
         };
         if plan.stops.is_empty() {
-            return Err(ScanError::NothingReachable);
+            return Err(NOTHING_REACHABLE.into());
         }
         Ok(plan)
     }
@@ -82,9 +85,11 @@ impl Plan {
     }
 }
 
-fn checked_points(counts: &[usize]) -> Result<usize, ScanError> {
+fn checked_points(counts: &[usize]) -> Result<usize, Error> {
     let points = counts.iter().try_fold(1_usize, |product, &count| product.checked_mul(count));
-    points.filter(|&points| points <= SCAN_POINTS).ok_or(ScanError::TooManyPoints { limit: SCAN_POINTS })
+    points
+        .filter(|&points| points <= SCAN_POINTS)
+        .ok_or_else(|| error!("the plan has more than {SCAN_POINTS} points: widen its spacing"))
 }
 
 /// Places of a grid with the last axis fastest, every other row backwards, each with its number in plain order.
@@ -107,7 +112,7 @@ fn serpentine(counts: &[usize]) -> impl Iterator<Item = (usize, Vec<usize>)> {
     })
 }
 
-fn workspace(plan: &WorkspacePlan, chain: &Chain, node: usize) -> Result<Plan, ScanError> {
+fn workspace(plan: &WorkspacePlan, chain: &Chain, node: usize) -> Result<Plan, Error> {
     let counts = [plan.across[0].count, plan.across[1].count];
     let depth = plan.depth;
     let points = checked_points(&[counts[0], counts[1], depth.count])?;
@@ -139,7 +144,7 @@ fn workspace(plan: &WorkspacePlan, chain: &Chain, node: usize) -> Result<Plan, S
         visit(back, None, &mut result.stops);
     }
     if result.unreachable.len() == points {
-        return Err(ScanError::NothingReachable);
+        return Err(NOTHING_REACHABLE.into());
     }
     Ok(result)
 }

@@ -1,8 +1,8 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::{BakeError, build_object};
+use super::build_object;
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Model, Proximity},
     object::Object,
     proxy::{Chain, PRESS_GAP, Press, inverse_kinematics::approach},
@@ -60,7 +60,7 @@ impl Placing {
     ///
     /// # Errors
     /// When the object is refused.
-    pub fn new(scene: &Scene, wanted: Option<DVec3>) -> Result<Self, BakeError> {
+    pub fn new(scene: &Scene, wanted: Option<DVec3>) -> Result<Self, Error> {
         let (Shape::Sphere { centre, .. }
         | Shape::Icosphere { centre, .. }
         | Shape::Mesh { centre, .. }
