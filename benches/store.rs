@@ -8,19 +8,17 @@
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
 mod clock;
-#[path = "../tests/desktop/mod.rs"]
+#[path = "../tests/common/desktop.rs"]
 mod desktop;
-#[path = "../tests/synthetic/mod.rs"]
-mod synthetic;
 
 use clock::nanoseconds;
-use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
     contact::{Model, Status},
     dataset::{Axis, Dataset, Grid, Provenance},
     draw::diagram::{Diagram, Series},
     field::TorqueField,
+    fixtures::grids,
     proxy::Chain,
     render::haptic::{Haptics, Inputs},
     report::write_both,
@@ -103,7 +101,7 @@ fn look_ups() {
         let placing = nanoseconds(BLOCKS, LOOK_UPS, |k| {
             black_box(place(k));
         });
-        let base = synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]);
+        let base = grids::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]);
         let store = Arc::new(dense(&base, levels));
         let stored = nanoseconds(BLOCKS, LOOK_UPS, |k| {
             black_box(store.sample(&place(k)));
@@ -118,9 +116,9 @@ fn look_ups() {
             black_box(haptics.tick(&mut state, &inputs));
         });
         let points = ((count - 1) << (levels - 1)) + 1;
-        let grid = synthetic::grid(&vec![(-0.6, 1.2 / (points - 1) as f64, points); joints]);
-        let field = TorqueField::interpolated(&synthetic::half_space(grid, 5.0), Interpolation::Potential, 0.5, &slope)
-            .unwrap();
+        let grid = grids::grid(&vec![(-0.6, 1.2 / (points - 1) as f64, points); joints]);
+        let field =
+            TorqueField::interpolated(&grids::half_space(grid, 5.0), Interpolation::Potential, 0.5, &slope).unwrap();
         let grid = nanoseconds(BLOCKS, LOOK_UPS, |k| {
             black_box(field.sample(&place(k)));
         });

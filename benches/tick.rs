@@ -9,17 +9,15 @@
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
 mod clock;
-#[path = "../tests/desktop/mod.rs"]
+#[path = "../tests/common/desktop.rs"]
 mod desktop;
-#[path = "../tests/synthetic/mod.rs"]
-mod synthetic;
 
 use clock::nanoseconds;
-use haptize as engine;
 use haptize::{
     JointVector, MAX_JOINTS,
     device::Motion,
     field::{Flags, TorqueField},
+    fixtures::grids,
     render::{
         haptic::{Haptics, Inputs},
         live::LiveScene,
@@ -123,8 +121,7 @@ fn main() {
     );
     let cost = |joints: usize, interpolation: Interpolation| {
         let count = [0, 4000, 200, 30, 14, 9, 7][joints];
-        let mut data =
-            synthetic::half_space(synthetic::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]), 5.0);
+        let mut data = grids::half_space(grids::grid(&vec![(-0.6, 1.2 / (count - 1) as f64, count); joints]), 5.0);
         let depth = |point: usize| data.grid.configuration(point).iter().sum::<f64>() / (joints as f64).sqrt();
         data.gap = Some((0..data.grid.points()).map(|point| -depth(point) as f32).collect::<Vec<_>>().into());
         let spec = desktop::haptics(joints);

@@ -1,6 +1,5 @@
 //! Numbers that look random, the same in every run.
 
-#[cfg(test)]
 use glam::DVec3;
 
 /// A linear congruential generator, of which the upper 53 bits count (Knuth 1998, The Art of Computer Programming,
@@ -27,9 +26,15 @@ impl Random {
     }
 
     /// Uniform in the cube from -1 to 1.
-    #[cfg(test)]
     pub fn vector(&mut self) -> DVec3 {
         DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
+    }
+
+    /// `count` of these from `seed`.
+    #[must_use]
+    pub fn vectors(count: usize, seed: u64) -> Vec<DVec3> {
+        let mut random = Self::new(seed);
+        (0..count).map(|_| random.vector()).collect()
     }
 }
 

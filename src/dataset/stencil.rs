@@ -111,7 +111,7 @@ impl Stencil {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::synthetic::grid;
+    use crate::fixtures::grids::grid;
 
     #[test]
     fn weights_reproduce_the_configuration_in_one_to_six_joints() {

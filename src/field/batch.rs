@@ -113,7 +113,7 @@ mod tests {
     use crate::{
         JointVector,
         field::Sample,
-        field::synthetic::{grid, half_space},
+        fixtures::grids::{grid, half_space},
         scene::Interpolation,
     };
 

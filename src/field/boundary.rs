@@ -162,7 +162,7 @@ fn beside(grid: &Grid, set: &[bool]) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{field::synthetic::grid, random::Random};
+    use crate::{fixtures::grids::grid, random::Random};
 
     fn slope(values: &[f64]) -> JointVector {
         JointVector::from_slice(values)

@@ -204,11 +204,4 @@ impl TorqueField {
 }
 
 #[cfg(test)]
-use crate as engine;
-
-#[cfg(test)]
-#[path = "../../tests/synthetic/mod.rs"]
-pub(crate) mod synthetic;
-
-#[cfg(test)]
 mod tests;

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
     use crate::{
         JointVector,
-        field::synthetic::{grid, half_space},
+        fixtures::grids::{grid, half_space},
         scene::Interpolation,
     };
 

@@ -1,7 +1,7 @@
 //! Properties of the field whatever is interpolated, and of each interpolation.
 
 use super::*;
-use crate::field::synthetic::{grid, half_space};
+use crate::fixtures::grids::{grid, half_space};
 use crate::{
     MAX_JOINTS,
     contact::Status,

@@ -283,7 +283,7 @@ fn centre(grid: &Grid) -> JointVector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::synthetic::{grid, half_space};
+    use crate::fixtures::grids::{grid, half_space};
 
     #[test]
     fn the_borders_stiffness_is_told_once_where_joints_are_alike() {

@@ -313,7 +313,7 @@ impl Lattice for UniformGrid<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{dataset::Stored, field::synthetic, sweep::table::Block};
+    use crate::{dataset::Stored, fixtures::grids, sweep::table::Block};
 
     const SHAPE: Shape =
         Shape { joints: 1, surface_nodes: 9, with_forces: true, with_tangent: false, with_slip: false };
@@ -344,7 +344,7 @@ mod tests {
     #[test]
     fn a_point_starts_from_neighbours_that_predict_less_energy() {
         // U grows by 1 a step of 1 with torque -1; point 2 holds 0.5 too much.
-        let grid = synthetic::grid(&[(0.0, 1.0, 5)]);
+        let grid = grids::grid(&[(0.0, 1.0, 5)]);
         let five = columns(&[1.0, 2.0, 3.5, 4.0, 5.0]);
         let mut table = Table::new(SHAPE.width(), vec![Block::of(&five, 0)]);
         let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
@@ -354,7 +354,7 @@ mod tests {
         // Below the tolerance nothing is tried.
         let near = columns(&[1.0, 2.0 + 0.5 * EDGE_TOLERANCE, 3.0]);
         let mut table = Table::new(SHAPE.width(), vec![Block::of(&near, 0)]);
-        let grid = synthetic::grid(&[(0.0, 1.0, 3)]);
+        let grid = grids::grid(&[(0.0, 1.0, 3)]);
         let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
         assert!((0..3).all(|point| starts(&around, point, |_| true).is_empty()));
     }

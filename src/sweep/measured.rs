@@ -303,7 +303,7 @@ mod tests {
     use super::*;
     use crate::{
         contact::Equilibrium,
-        field::synthetic,
+        fixtures::grids,
         sweep::{
             columns::{Columns, Shape},
             table::Block,
@@ -344,7 +344,7 @@ mod tests {
 
     #[test]
     fn configurations_are_spread_evenly_over_the_cells_in_contact() {
-        let grid = synthetic::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
+        let grid = grids::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
         let columns = columns(&grid);
         let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
@@ -371,7 +371,7 @@ mod tests {
 
     #[test]
     fn a_window_around_a_configuration_gives_what_the_whole_grid_gives() {
-        let grid = synthetic::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
+        let grid = grids::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
         let columns = columns(&grid);
         let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
         let places = places(&grid, &table, 54 * 80, 50, DRAWS);

@@ -2,7 +2,8 @@
 //!
 //! Compared with `tests/snapshots/printed.txt`; with `UPDATE_SNAPSHOTS=1` that file is written again.
 
-use super::{FINGER, changed, haptize, text, without_grid};
+use super::commands::{FINGER, changed, without_grid};
+use crate::common::program::{haptize, text};
 use serde_json::Value;
 use std::{collections::BTreeMap, fmt::Write, fs, path::Path};
 
@@ -197,7 +198,7 @@ fn furnish(folder: &Path) {
     write("plan.toml", PLAN);
     write("log.csv", &log());
     write("columns.toml", COLUMNS);
-    let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/urdf/robots/finger.urdf");
+    let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/robots/finger.urdf");
     fs::copy(robot, folder.join("finger.urdf")).unwrap();
 }
 

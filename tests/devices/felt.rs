@@ -1,14 +1,12 @@
 //! A half space felt through a device, tick by tick.
 
-use crate::{
-    desktop::{haptics, proxy},
-    synthetic::{grid, half_space},
-};
+use crate::common::desktop::{haptics, proxy};
 use assert_no_alloc::assert_no_alloc;
 use haptize::{
     JointVector,
     device::{Device, Motion, SimulatedHand},
     field::TorqueField,
+    fixtures::grids::{grid, half_space},
     render::{haptic::Haptics, session::Driver, trace::Tick},
     scene::{Interpolation, Waypoint},
 };

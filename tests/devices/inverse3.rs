@@ -2,7 +2,7 @@
 //! for each message, commands that count once, idle after silence. And what may come instead.
 
 use crate::{
-    desktop::haptics,
+    common::desktop::haptics,
     felt::{PERIOD, all},
 };
 use haptize::{
@@ -382,7 +382,7 @@ fn a_cursor_leads_an_arm() {
         LinearMap::identity(3),
         chain,
         &DeviceSpec::default(),
-        &crate::desktop::haptics(3),
+        &crate::common::desktop::haptics(3),
     );
     for _ in 0..200 {
         thread::sleep(Duration::from_millis(1));

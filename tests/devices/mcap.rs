@@ -1,6 +1,9 @@
 //! Joint states in MCAP: sessions and plans written, logs of robots read.
 
-use crate::program::FINGER;
+use crate::{
+    common::program::{self, message},
+    program::finger,
+};
 use haptize::{
     Error, JointVector,
     logs::{Effort, Mapping, import},
@@ -14,7 +17,6 @@ use std::{
     fs,
     io::Read,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 /// A file of `states`, each with its topic.
@@ -321,16 +323,15 @@ fn damaged_files_are_errors_with_the_remedy_and_never_panics() {
 const SAME_WAY: f64 = 1e-4;
 
 fn haptize(folder: &Path, arguments: &[&str]) -> (bool, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_haptize")).args(arguments).current_dir(folder).output().unwrap();
-    let text = String::from_utf8_lossy(if output.status.success() { &output.stdout } else { &output.stderr });
-    (output.status.success(), text.into_owned())
+    let output = program::haptize(folder, arguments);
+    (output.status.success(), if output.status.success() { program::text(&output.stdout) } else { message(&output) })
 }
 
 #[test]
 fn a_session_is_recorded_as_mcap_and_gridized_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    fs::write(path.join("finger.toml"), FINGER).unwrap();
+    fs::write(path.join("finger.toml"), finger()).unwrap();
     assert!(haptize(path, &["bake", "finger.toml", "-o", "f.haptize", "--backend", "cpu"]).0);
     let (fine, told) = haptize(path, &["play", "f.haptize", "--record", "session.mcap"]);
     assert!(fine, "{told}");

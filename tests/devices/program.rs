@@ -1,5 +1,6 @@
 //! The program: `haptize device`, and `play` with a device.
 
+use crate::common::program::{command, haptize, message};
 use haptize::scan::{RowStatus, ScanLog};
 #[cfg(unix)]
 use rustix::process::{Pid, Signal, kill_process};
@@ -7,38 +8,18 @@ use serde_json::Value;
 use std::{
     io::{BufRead, BufReader},
     path::Path,
-    process::{Command, Output},
+    process::Output,
     time::{Duration, Instant},
 };
 
-/// A finger of one joint above a ball, at eight angles.
-pub const FINGER: &str = r#"name = "finger"
-[object]
-node_mass = 0.005
-sphere = { radius = 0.05, rings = 10, segments = 10 }
-springs = { kind = "isotropic", stiffness = 300.0 }
-ground = { stiffness = 100.0 }
-[[proxy.joint]]
-kind = "revolute"
-origin = [-0.1, 0.0, 0.06]
-axis = [0.0, 1.0, 0.0]
-limits = [-0.5, 0.5]
-nodes = [{ at = [0.1, 0.0, 0.0] }]
-[contact]
-stiffness = 1000.0
-[grid]
-axes = [{ start = 0.0, stop = 0.28, count = 8 }]
-[motion]
-press = [{ time = 0.0, q = [0.05] }, { time = 0.4, q = [0.22] }, { time = 1.0, q = [0.22] }]
-"#;
-
-fn haptize(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_haptize")).args(arguments).current_dir(folder).output().unwrap()
+/// A finger of one joint above a ball, at eight angles, and a press.
+pub fn finger() -> String {
+    let press = "press = [{ time = 0.0, q = [0.05] }, { time = 0.4, q = [0.22] }, { time = 1.0, q = [0.22] }]";
+    format!("{}[motion]\n{press}\n", include_str!("../scenes/finger.toml"))
 }
 
 fn json(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)))
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {}", message(output)))
 }
 
 #[test]
@@ -67,7 +48,7 @@ fn a_check_reads_then_holds_zero_torque_and_finds_what_fails() {
     // A scene lowers what is used of the device's limit, and names as many coordinates.
     let limited = |count: usize| {
         let limits = vec!["0.001"; count].join(", ");
-        let scene = format!("{FINGER}\n[device]\neffort_limit = [{limits}]\n");
+        let scene = format!("{}[device]\neffort_limit = [{limits}]\n", finger());
         std::fs::write(folder.path().join("limited.toml"), scene).unwrap();
         let check = ["device", "check", "simulated", "--seconds", "0.1", "--json", "--scene", "limited.toml"];
         haptize(folder.path(), &check)
@@ -98,7 +79,7 @@ fn a_check_reads_then_holds_zero_torque_and_finds_what_fails() {
 fn play_drives_a_device_and_records_its_clamps_and_stops() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    std::fs::write(path.join("finger.toml"), FINGER).unwrap();
+    std::fs::write(path.join("finger.toml"), finger()).unwrap();
     assert_eq!(haptize(path, &["bake", "finger.toml", "-o", "f.haptize", "--backend", "cpu"]).status.code(), Some(0));
     let played =
         haptize(path, &["play", "f.haptize", "--device", "simulated", "--json", "-o", "felt", "--record", "r.csv"]);
@@ -124,11 +105,10 @@ fn play_drives_a_device_and_records_its_clamps_and_stops() {
 fn a_hand_that_loses_its_torque_is_told_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    std::fs::write(path.join("finger.toml"), FINGER).unwrap();
+    std::fs::write(path.join("finger.toml"), finger()).unwrap();
     assert_eq!(haptize(path, &["bake", "finger.toml", "-o", "f.haptize", "--backend", "cpu"]).status.code(), Some(0));
-    let mut play = Command::new(env!("CARGO_BIN_EXE_haptize"))
-        .args(["play", "f.haptize", "--device", "simulated:silent@0.3-0.4", "--seconds", "60", "-o", "felt"])
-        .current_dir(path)
+    let device = "simulated:silent@0.3-0.4";
+    let mut play = command(path, &["play", "f.haptize", "--device", device, "--seconds", "60", "-o", "felt"])
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::piped())
         .spawn()
@@ -198,9 +178,8 @@ fn a_whole_plan_is_scanned_with_a_touch_by_the_command_line() {
     std::fs::write(path.join("plan.toml"), PLAN).unwrap();
     let device = format!("touch:{}", crate::vendor::built("hd").display());
     let scan = |more: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_haptize"));
-        command.args(["scan", "plan.toml", "--device", &device, "--json"]).args(more).current_dir(path);
-        command.env("STAND_IN_FREE", "1").output().unwrap()
+        let mut command = command(path, &["scan", "plan.toml", "--device", &device, "--json"]);
+        command.args(more).env("STAND_IN_FREE", "1").output().unwrap()
     };
     let mut output = scan(&[]);
     // Where other programs, or those of the machine's owner, held the scan up, its user continues it.
@@ -316,12 +295,9 @@ fn signalled(folder: &Path, signals: &'static [Signal]) -> (std::process::Output
     let firmware = Watched { firmware: crate::emulator::TwoDiyFirmware::default(), sent: sent.clone() };
     let emulator = crate::emulator::Emulator::new(firmware, crate::felt::pressing(2, &middle));
     let (_, (output, signalled)) = emulator.beside(true, |line| {
-        let mut play = Command::new(env!("CARGO_BIN_EXE_haptize"));
-        play.args(["play", "s.haptize", "--seconds", "60", "--record", "r.csv", "-o", "felt", "--json"])
-            .args(["--device", &format!("2diy:{line}")])
-            .current_dir(folder)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
+        let mut play =
+            command(folder, &["play", "s.haptize", "--seconds", "60", "--record", "r.csv", "-o", "felt", "--json"]);
+        play.args(["--device", &format!("2diy:{line}")]).stdout(Stdio::piped()).stderr(Stdio::piped());
         // As from a terminal, whoever has started this process to ignore the signal.
         // SAFETY: the call is one that may be made between fork and exec.
         unsafe {

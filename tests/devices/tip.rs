@@ -1,7 +1,7 @@
 //! The adapter of Cartesian devices: a spring in space between the tip and a node of an arm.
 
 use crate::{
-    desktop::haptics,
+    common::desktop::haptics,
     felt::{PERIOD, all},
 };
 use assert_no_alloc::assert_no_alloc;

@@ -2,7 +2,7 @@
 //! errors, and a scheduler that owns the thread.
 
 use crate::{
-    desktop::haptics,
+    common::desktop::haptics,
     felt::{PERIOD, all, half_space_loop},
 };
 use haptize::{

@@ -1,6 +1,7 @@
 //! A dataset stands alone: every command that reads one needs neither scene nor mesh, and says the same without them.
 
-use crate::program::{OBJECTS, command, message, succeed, write_scene};
+use super::objects::{OBJECTS, write_scene};
+use crate::common::program::{command, message, succeed};
 use haptize::{
     dataset::Dataset,
     object::{Object, ObjectError},

@@ -3,10 +3,11 @@
 //!
 //! `HAPTIZE_KILLS` sets the number of bakes that are killed on each backend.
 
-use crate::{
+use super::{
     fuzz::Random,
-    program::{BLOCK, OBJECTS, command, message, succeed, write_scene},
+    objects::{BLOCK, OBJECTS, write_scene},
 };
+use crate::common::program::{command, message, succeed};
 use haptize::{
     dataset::{Axis, Grid, Provenance},
     store::{Space, Store},
@@ -292,7 +293,7 @@ fn work_for_which_there_is_no_memory_is_refused_before_it_begins() {
         let object = format!(
             "sphere = {{ radius = 0.04, edge = {edge} }}\nsprings = {{ kind = \"{springs}\", stiffness = 300.0 }}"
         );
-        crate::program::scene(&object, 4)
+        super::objects::scene(&object, 4)
     };
     std::fs::write(folder.join("dense.toml"), sphere("0.0035", "axial")).unwrap();
     std::fs::write(folder.join("fine.toml"), sphere("0.0002", "isotropic")).unwrap();

@@ -2,7 +2,8 @@
 
 #![cfg(unix)]
 
-use crate::program::{OBJECTS, command, message, scene, succeed, write_scene};
+use super::objects::{OBJECTS, scene, write_scene};
+use crate::common::program::{command, message, succeed};
 use std::{
     path::Path,
     process::{Command, Stdio},

@@ -1,14 +1,16 @@
 //! Nothing silent, nothing lost: datasets that need nothing but their file, readers that no file harms, and bakes that
 //! survive what stops them.
 
-// Helpers outside test functions may fail the test too.
-#![allow(clippy::unwrap_used, clippy::panic)]
+// clippy.toml allows it inside #[test] functions only; helpers need it, too.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod alone;
+#[path = "../common/mod.rs"]
+mod common;
 mod crash;
 mod fuzz;
 mod inputs;
+mod objects;
 mod outputs;
-mod program;
 mod signals;
 mod telling;

@@ -1,7 +1,8 @@
 //! What commands write: never over an input, over a file of another kind, or to what is no regular file; nothing of
 //! another run is left beside it, and what was replaced is told.
 
-use crate::program::{OBJECTS, command, message, succeed, write_scene};
+use super::objects::{OBJECTS, write_scene};
+use crate::common::program::{command, message, succeed};
 use serde_json::Value;
 use std::{
     collections::BTreeSet,

@@ -3,7 +3,8 @@
 
 #![cfg(unix)]
 
-use crate::program::{OBJECTS, command, message, scene, write_scene};
+use super::objects::{OBJECTS, scene, write_scene};
+use crate::common::program::{command, message};
 use std::{
     path::Path,
     process::{Child, Command, Output, Stdio},

@@ -1,7 +1,8 @@
 //! What is said: nothing that a file holds commands a terminal, files that contradict themselves are not called sound,
 //! and every message names the file and a remedy that helps.
 
-use crate::program::{OBJECTS, command, message, succeed, write_scene};
+use super::objects::{OBJECTS, write_scene};
+use crate::common::program::{command, message, succeed};
 use haptize::dataset::Dataset;
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -77,7 +78,7 @@ fn a_dataset_whose_scene_describes_another_is_not_sound() {
     forge(home.path(), "unit.haptize", |dataset| dataset.grid.axes[1].unit = "rad".into());
     forge(home.path(), "broken.haptize", |dataset| dataset.scene = "name = 3".into());
     let sphere = "sphere = { radius = 0.04, subdivisions = 2 }\nsprings = { kind = \"isotropic\", stiffness = 300.0 }";
-    std::fs::write(home.path().join("sphere.toml"), crate::program::scene(sphere, 4)).unwrap();
+    std::fs::write(home.path().join("sphere.toml"), super::objects::scene(sphere, 4)).unwrap();
     succeed(home.path(), &["bake", "sphere.toml", "-o", "x.haptize", "--backend", "cpu"]);
     forge(home.path(), "radius.haptize", |dataset| {
         dataset.scene = dataset.scene.replace("radius = 0.04", "radius = 4.0")

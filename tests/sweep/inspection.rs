@@ -1,6 +1,7 @@
 //! One configuration in full.
 
 use crate::{
+    common::program::json,
     equilibria::relative_error,
     fixture::{Folder, POINTS, SCENE, scene, sweep},
 };
@@ -18,17 +19,12 @@ use std::sync::atomic::AtomicBool;
 fn an_inspection_tells_the_same_from_scene_and_dataset() {
     let folder = Folder::new();
     std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
-    let haptize = |arguments: &[&str]| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
-        let output = command.current_dir(folder.0.path()).args(arguments).arg("--json").output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
-    };
-    haptize(&["bake", "small.toml", "--backend", "cpu"]);
+    let json = |arguments: &[&str]| json(folder.0.path(), arguments);
+    json(&["bake", "small.toml", "--backend", "cpu", "--json"]);
     std::fs::remove_file(folder.0.path().join("small.toml")).unwrap();
-    let from_dataset = haptize(&["inspect", "small.haptize", "--q", "-0.2,0.042"]);
+    let from_dataset = json(&["inspect", "small.haptize", "--q", "-0.2,0.042", "--json"]);
     std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
-    let mut from_scene = haptize(&["inspect", "small.toml", "--q=-0.2,0.042"]);
+    let mut from_scene = json(&["inspect", "small.toml", "--q=-0.2,0.042", "--json"]);
     assert_eq!(from_scene["status"], "contact");
     // The grid point 1 x 8, as it was stored and as it is solved anew.
     assert_eq!(from_dataset["stored"]["point"], 9 + 8);
@@ -41,11 +37,11 @@ fn an_inspection_tells_the_same_from_scene_and_dataset() {
     }
     assert_eq!(from_scene, from_dataset);
     assert_eq!(from_scene["warnings"].as_array().map(Vec::len), Some(0));
-    let in_percent = haptize(&["inspect", "small.toml", "--q=16.6666666667%,100%"]);
+    let in_percent = json(&["inspect", "small.toml", "--q=16.6666666667%,100%", "--json"]);
     assert!(relative_error(&torque(&in_percent), &torque(&from_scene)) < 1e-6, "{in_percent}");
-    let elsewhere = haptize(&["inspect", "small.toml", "--q=17%,100%"]);
+    let elsewhere = json(&["inspect", "small.toml", "--q=17%,100%", "--json"]);
     assert!(relative_error(&torque(&elsewhere), &torque(&from_scene)) > 1e-6, "{elsewhere}");
-    let beyond = haptize(&["inspect", "small.toml", "--q=-9.0,0.042"]);
+    let beyond = json(&["inspect", "small.toml", "--q=-9.0,0.042", "--json"]);
     assert!(beyond["warnings"][0].as_str().unwrap().contains("beyond the joint's limits"), "{beyond}");
 }
 

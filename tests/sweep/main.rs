@@ -1,9 +1,16 @@
-//! Sweeps: the dataset depends on nothing but scene and backend, and an interruption leaves no trace in it.
+//! Datasets and stores, and what fills and reads them: a dataset depends on nothing but scene and backend, and an
+//! interruption leaves no trace in it.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
+// clippy.toml allows it inside #[test] functions only; helpers need it, too.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod accuracy;
+#[path = "../common/mod.rs"]
+mod common;
+mod dataset;
 mod equilibria;
 mod failure;
+mod field;
 mod fixture;
 mod inspection;
 mod lowest;
@@ -16,4 +23,5 @@ mod reach;
 mod results;
 mod resume;
 mod shards;
+mod store;
 mod thin_parts;

@@ -1,6 +1,9 @@
 //! `bake --max-error`: chosen by a pilot, stated, baked, verified; and refused where no grid can keep the error.
 
-use crate::fixture::{Folder, SCENE};
+use crate::{
+    common::program::haptize,
+    fixture::{Folder, SCENE},
+};
 use haptize::{
     dataset::Dataset,
     field::TorqueField,
@@ -10,7 +13,7 @@ use haptize::{
     sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot},
 };
 use serde_json::Value;
-use std::{path::Path, process::Output, sync::atomic::AtomicBool};
+use std::{path::Path, sync::atomic::AtomicBool};
 
 /// The small sphere on 25 x 29 grid points, touched by balls: torque has kinks, and hardly a jump.
 fn text() -> String {
@@ -36,11 +39,6 @@ axis = [0.0, 0.0, -1.0]
 limits = [-0.02, 0.02]
 nodes = [{ at = [0.0, 0.0, 0.06], radius = 0.01 }]
 "#;
-
-fn haptize(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
-    command.current_dir(folder).args(arguments).output().unwrap()
-}
 
 #[test]
 fn a_grid_is_chosen_stated_baked_and_verified() {

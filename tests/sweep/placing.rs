@@ -1,6 +1,9 @@
 //! An arm before an object: what `place` finds touches, and what it says of an object out of reach would mend it.
 
-use crate::fixture::Folder;
+use crate::{
+    common::program::{command, message},
+    fixture::Folder,
+};
 use glam::DVec3;
 use haptize::{
     contact::{Model, Proximity},
@@ -90,12 +93,9 @@ fn a_scene_that_place_completes_keeps_its_comments_bakes_and_presses() {
     let folder = Folder::new();
     let path = folder.0.path();
     std::fs::write(path.join("a.toml"), SCENE).unwrap();
-    let run = |arguments: &[&str]| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
-        command.current_dir(path).args(arguments).arg("--json").output().unwrap()
-    };
+    let run = |arguments: &[&str]| command(path, arguments).arg("--json").output().unwrap();
     let placed = run(&["place", "a.toml", "--write"]);
-    assert!(placed.status.success(), "{}", String::from_utf8_lossy(&placed.stderr));
+    assert!(placed.status.success(), "{}", message(&placed));
     let text = std::fs::read_to_string(path.join("a.toml")).unwrap();
     assert!(text.starts_with(SCENE.trim_end()) && text.contains("# as I like it"), "{text}");
     let baked = run(&["bake", "a.toml", "--backend", "cpu"]);

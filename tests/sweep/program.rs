@@ -1,6 +1,9 @@
 //! The program killed, interrupted, and without room on the disk.
 
-use crate::fixture::{Folder, SCENE};
+use crate::{
+    common::program::{PROGRAM, command},
+    fixture::{Folder, SCENE},
+};
 use haptize::dataset::Dataset;
 use rustix::process::{Pid, Signal, kill_process};
 use std::path::Path;
@@ -36,8 +39,8 @@ fn program_at_work(folder: &Folder, turns: usize) -> std::process::Child {
 }
 
 fn program(folder: &Folder, more: &[&str]) -> std::process::Command {
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
-    command.current_dir(folder.0.path()).args(["bake", "fine.toml", "--backend", "cpu", "--json"]).args(more);
+    let mut command = command(folder.0.path(), &["bake", "fine.toml", "--backend", "cpu", "--json"]);
+    command.args(more);
     command
 }
 
@@ -80,7 +83,7 @@ fn a_full_disk_leaves_the_earlier_file_and_no_rubbish() {
     let folder = Folder::new();
     std::fs::write(folder.0.path().join("small.toml"), SCENE).unwrap();
     let haptize = |prelude: &str, arguments: &str| {
-        let line = format!("{prelude} exec '{}' {arguments}", env!("CARGO_BIN_EXE_haptize"));
+        let line = format!("{prelude} exec '{}' {arguments}", PROGRAM);
         std::process::Command::new("sh").current_dir(folder.0.path()).args(["-c", &line]).output().unwrap()
     };
     assert!(haptize("", "bake small.toml --backend cpu").status.success());
@@ -131,7 +134,7 @@ fn killed_shards_are_continued_and_merged_to_the_numbers_of_one_bake() {
     let json = |output: &std::process::Output| serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap();
     assert!(task(&folder, 0).output().unwrap().status.success());
     let merge = || {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+        let mut command = std::process::Command::new(PROGRAM);
         command
             .current_dir(folder.0.path())
             .args(["merge", "parts", "-o", "merged.haptize", "--json"])

@@ -1,7 +1,9 @@
 //! A bake tells when the arm pushes through a thin part of the object.
 
-use crate::fixture::Folder;
-use std::process::Command;
+use crate::{
+    common::program::{haptize, text},
+    fixture::Folder,
+};
 
 /// A plate 2 mm thick around z = 0.
 const PLATE: &str = "v -0.02 -0.02 -0.001\nv 0.02 -0.02 -0.001\nv -0.02 0.02 -0.001\nv 0.02 0.02 -0.001\n\
@@ -23,9 +25,8 @@ fn told(last: f64, step: f64, arguments: &[&str]) -> String {
     std::fs::write(folder.0.path().join("plate.toml"), scene).unwrap();
     std::fs::write(folder.0.path().join("motion.csv"), format!("time,press\n0,-0.004\n0.3,{last}\n")).unwrap();
     let run = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_haptize"));
-        let output = command.current_dir(folder.0.path()).args(arguments).output().unwrap();
-        let [told, errors] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+        let output = haptize(folder.0.path(), arguments);
+        let [told, errors] = [&output.stdout, &output.stderr].map(|bytes| text(bytes));
         assert!(output.status.success(), "{arguments:?}: {errors}");
         told + &errors
     };

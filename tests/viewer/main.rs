@@ -2,8 +2,11 @@
 //! drawn by software Vulkan, its haptic loop runs by steps, so that every run is the same.
 
 #![cfg(feature = "viewer")]
-#![allow(clippy::unwrap_used)]
+// clippy.toml allows it inside #[test] functions only; helpers need it, too.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod feel;
 mod looks;
 mod open;

@@ -1,6 +1,7 @@
 //! How something is opened or baked, and what is said when it is not.
 
 use super::window::{DEVICE_NAME, SPHERE, Window, colours, scanned, small_scene};
+use crate::common::program::{command, message};
 use eframe::egui::{Pos2, RawInput, Rect, Theme, accesskit::Role, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use haptize::{
@@ -256,10 +257,9 @@ fn a_window_whose_device_is_lost_says_so_and_paints_nothing_more() {
 
 #[test]
 fn an_adapter_that_the_environment_names_and_is_not_there_is_told_with_what_is() {
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
-    command.args(["view", "--screenshot", "never.png"]).env("WGPU_ADAPTER_NAME", "Unplugged");
-    let output = command.output().unwrap();
-    let message = String::from_utf8(output.stderr).unwrap();
+    let mut command = command(Path::new("."), &["view", "--screenshot", "never.png"]);
+    let output = command.env("WGPU_ADAPTER_NAME", "Unplugged").output().unwrap();
+    let message = message(&output);
     assert_eq!(output.status.code(), Some(1), "{message}");
     for part in ["\"Unplugged\"", "WGPU_ADAPTER_NAME", "software"] {
         assert!(message.contains(part), "{message}");
@@ -270,13 +270,13 @@ fn an_adapter_that_the_environment_names_and_is_not_there_is_told_with_what_is()
 #[cfg(target_os = "linux")]
 fn without_a_display_the_file_is_looked_at_first_and_the_remedy_is_told_in_a_sentence() {
     let view = |file: &str| {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_haptize"));
+        let mut command = command(Path::new("."), &["view", file]);
         for display in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
             command.env_remove(display);
         }
-        let output = command.args(["view", file]).output().unwrap();
+        let output = command.output().unwrap();
         assert_eq!(output.status.code(), Some(1));
-        String::from_utf8(output.stderr).unwrap()
+        message(&output)
     };
     let message = view("none.haptize");
     assert!(message.starts_with("haptize: none.haptize: cannot be read") && !message.contains("display"), "{message}");

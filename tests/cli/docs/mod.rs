@@ -120,7 +120,7 @@ fn copy(from: &Path, to: &Path) {
 /// third of its lines.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for part in ["datasets", "tests/urdf/robots"] {
+    for part in ["datasets", "tests/robots"] {
         copy(&root().join(part), &folder.path().join(part));
     }
     for scene in ["datasets/sponge.toml", "datasets/sponge_fabric.toml"] {

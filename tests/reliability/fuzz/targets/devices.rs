@@ -1,7 +1,7 @@
 //! How devices stand to a scene's arm, and what they say on a serial line.
 
 use super::{Target, mutate};
-use crate::program;
+use crate::objects;
 use haptize::{
     JointVector,
     device::{
@@ -17,7 +17,7 @@ pub const DEVICES: Target = Target {
     name: "devices",
     extension: "toml",
     seeds: || {
-        let scene = program::scene(program::OBJECTS[0].1, 4);
+        let scene = objects::scene(objects::OBJECTS[0].1, 4);
         [
             "map = [[1, 0], [-1, 1]]\noffset = [0.0, -1.5708]\neffort_limit = [0.5, 0.3]\n",
             "map = [[0, 1, 0], [1, 0, 0], [0, 0, -1]]\noffset = [0.0, 0.1, 0.0]\nnode = 0\n\

@@ -1,7 +1,7 @@
 //! Files of meshes and of robots.
 
 use super::{Target, mutate, outcome, shipped, write};
-use crate::program;
+use crate::objects;
 use glam::DVec3;
 use haptize::{
     object::Object,
@@ -112,7 +112,7 @@ fn binary_stl() -> Vec<u8> {
 pub const MSH: Target = Target {
     name: "msh",
     extension: "msh",
-    seeds: || vec![program::BLOCK.into(), program::BLOCK_4.into()],
+    seeds: || vec![objects::BLOCK.into(), objects::BLOCK_4.into()],
     mutate: mutate::text,
     run: |file, input| {
         mesh(
@@ -129,7 +129,7 @@ pub const ROBOTS: Target = Target {
     name: "urdf",
     extension: "urdf",
     seeds: || {
-        let file = |name: &str| shipped(&format!("tests/urdf/robots/{name}"));
+        let file = |name: &str| shipped(&format!("tests/robots/{name}"));
         let arm = String::from_utf8(file("arm.urdf")).unwrap();
         vec![arm.replace("package://robots/meshes/tip.obj", "tip.obj").into_bytes(), file("finger.urdf")]
     },
@@ -137,7 +137,7 @@ pub const ROBOTS: Target = Target {
     run: |file, input| {
         write(file, input);
         // Beside the input, so that its text holds no path of the machine: everywhere the same is mutated.
-        write(&file.with_file_name("tip.obj"), &shipped("tests/urdf/robots/meshes/tip.obj"));
+        write(&file.with_file_name("tip.obj"), &shipped("tests/robots/meshes/tip.obj"));
         match imported(file) {
             // What is accepted makes a valid scene.
             Err(UrdfError::Scene(error)) => panic!("{error}"),

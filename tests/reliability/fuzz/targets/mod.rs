@@ -11,7 +11,7 @@ pub use meshes::{MSH, OBJ, PLY, ROBOTS, STL};
 pub use stores::STORES;
 
 use super::mutate::{self, Random};
-use crate::program;
+use crate::objects;
 use haptize::{
     dataset::{Dataset, JointLabel},
     device::Motion,
@@ -124,11 +124,11 @@ fn replayed(dataset: &Dataset, setup: &Setup, file: &Path) -> Result<(), String>
 
 /// A small dataset of every kind of object.
 static BAKED: LazyLock<Vec<Vec<u8>>> =
-    LazyLock::new(|| program::OBJECTS.iter().map(|(_, object)| baked(object)).collect());
+    LazyLock::new(|| objects::OBJECTS.iter().map(|(_, object)| baked(object)).collect());
 
 fn baked(object: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
-    program::write_scene(folder.path(), object, 4);
+    objects::write_scene(folder.path(), object, 4);
     let scene = Scene::load(folder.path().join("scene.toml")).unwrap();
     let file = folder.path().join("x.haptize");
     sweep::baked(&scene).unwrap().0.save(&file).unwrap();
@@ -183,7 +183,7 @@ pub const SCENES: Target = Target {
     seeds: || {
         let shipped = ["sphere", "mesh", "paper", "sponge", "sponge_side", "touch", "nodule"]
             .map(|name| shipped(&format!("datasets/{name}.toml")));
-        let small = program::OBJECTS.map(|(_, object)| program::scene(object, 4).into_bytes());
+        let small = objects::OBJECTS.map(|(_, object)| objects::scene(object, 4).into_bytes());
         shipped.into_iter().chain(small).collect()
     },
     mutate: mutate::text,

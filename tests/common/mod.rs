@@ -1,0 +1,6 @@
+//! What several test programs share.
+
+#![allow(dead_code)] // Each program takes what it needs.
+
+pub mod desktop;
+pub mod program;

@@ -1,9 +1,0 @@
-//! The GPU against the CPU's f64 code, on whatever adapter there is (software Vulkan counts). None is a failure.
-
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod adapter;
-mod equilibria;
-mod fixture;
-mod frames;
-mod stores;
