@@ -10,7 +10,7 @@
 //! and named by the node that it moves most.
 
 use super::{
-    ObjectError, Stiffness,
+    Stiffness,
     condensation::condense,
     substitution::{Partition, Supernodes, substitute},
 };
@@ -172,7 +172,7 @@ fn lower_half(stiffness: &Stiffness, alpha: f64, diagonal: &[f64], rows_per_node
 }
 
 /// The factor of K, or the reason why K is not positive definite to working precision.
-pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, ObjectError> {
+pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, Error> {
     let mut diagonal = stiffness.diagonal();
     let largest = diagonal.iter().copied().fold(0.0, f64::max);
     // A node without any spring.
@@ -193,7 +193,7 @@ pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, O
             let (smallest, softest) = softest_mode(&shifted, &roots);
             Err(mechanism(&softest, (smallest - MECHANISM_SHIFT).max(0.0) / norm))
         }
-        Err(error) => Err(error.into()),
+        Err(error) => Err(error),
     }
 }
 
@@ -230,10 +230,15 @@ fn norm(vectors: &[DVec3]) -> f64 {
 }
 
 /// The error that names the node which moves most in `mode`.
-fn mechanism(mode: &[DVec3], reciprocal_condition: f64) -> ObjectError {
+fn mechanism(mode: &[DVec3], reciprocal_condition: f64) -> Error {
     let largest = mode.iter().enumerate().max_by(|a, b| a.1.length_squared().total_cmp(&b.1.length_squared()));
     let (node, motion) = largest.map_or((0, DVec3::ZERO), |(node, motion)| (node, *motion));
-    ObjectError::Mechanism { node: node as u32, direction: motion.normalize_or_zero(), reciprocal_condition }
+    let [x, y, z] = motion.normalize_or_zero().to_array();
+    error!(
+        "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): node {node} can move \
+         along ({x:.2}, {y:.2}, {z:.2}) almost without force; axial springs leave such mechanisms, and a skin on sliver \
+         triangles comes near them: ground more nodes, stiffen the ground, use isotropic springs, or mesh evenly"
+    )
 }
 
 #[cfg(test)]

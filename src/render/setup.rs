@@ -90,7 +90,7 @@ impl Setup {
         let is_known = live.is_some() || ContactForces::known(dataset);
         let object = match (&scene.object, &scene.graphics, &dataset.surface) {
             (Some(object), Some(_), Some(surface)) if is_known => {
-                let object = surface.object(object).map_err(Error::from);
+                let object = surface.object(object);
                 Some(object.map_err(|error| error.within("the object in the dataset"))?)
             }
             _ => match scene.graphics.and_then(|graphics| graphics.effects.named()) {

@@ -215,7 +215,7 @@ impl Ground {
     }
 
     fn model(&self, scene: &Scene) -> Result<Model<'_>, Error> {
-        Ok(Model::reaching(&self.object, &self.chain, scene.contact, &sample(scene))?)
+        Model::reaching(&self.object, &self.chain, scene.contact, &sample(scene))
     }
 }
 

@@ -13,8 +13,8 @@ mod polygon;
 mod stl;
 mod text;
 
-use super::{Body, ObjectError, topology::place};
-use crate::input;
+use super::{Body, out_of_range, topology::place};
+use crate::{Error, ErrorKind, input};
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;
@@ -31,17 +31,19 @@ type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 const MAX_BYTES: u64 = 1 << 28;
 
 /// Reads the surface in `file`; merged nodes are reported in `warnings`.
-pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
+pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, Error> {
     if !(scale > 0.0 && scale.is_finite()) {
-        return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
+        return Err(out_of_range("scale", scale, "positive and finite"));
     }
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+    let unreadable = |reason: String| unreadable(file, &reason);
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let reader = match extension.as_str() {
         "obj" => obj::read,
         "stl" => stl::read,
         "ply" => ply::read,
-        _ => return Err(ObjectError::Format { file: file.to_owned() }),
+        _ => {
+            return Err(Error::at(file, "not a known mesh format: give a file that ends in .obj, .stl or .ply"));
+        }
     };
     let (nodes, mut triangles) = reader(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
     let count = nodes.len();
@@ -68,11 +70,11 @@ pub(super) fn read_tetrahedra(
     centre: DVec3,
     wanted: &[u32],
     warnings: &mut Vec<String>,
-) -> Result<Body, ObjectError> {
+) -> Result<Body, Error> {
     if !(scale > 0.0 && scale.is_finite()) {
-        return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
+        return Err(out_of_range("scale", scale, "positive and finite"));
     }
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+    let unreadable = |reason: String| unreadable(file, &reason);
     let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
     let nodes: Vec<DVec3> = mesh.nodes.iter().map(|node| scale * *node + centre).collect();
     warnings.extend(oversize(file, scale, &nodes));
@@ -103,9 +105,14 @@ fn oversize(file: &Path, scale: f64, nodes: &[DVec3]) -> Option<String> {
     })
 }
 
+/// The error of a mesh file that cannot be read.
+fn unreadable(file: &Path, reason: &str) -> Error {
+    Error::at(file, format_args!("cannot read the mesh: {reason}")).of(ErrorKind::File)
+}
+
 /// Opens a file of bounded length.
-fn open(file: &Path) -> Result<File, ObjectError> {
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+fn open(file: &Path) -> Result<File, Error> {
+    let unreadable = |reason: String| unreadable(file, &reason);
     let stream = input::open(file).map_err(|error| unreadable(error.to_string()))?;
     let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
     if attributes.len() > MAX_BYTES {
