@@ -14,7 +14,7 @@ use std::{
 #[error("{text}")]
 pub struct Error {
     kind: ErrorKind,
-    place: Option<Place>,
+    location: Option<Location>,
     text: String,
 }
 
@@ -40,7 +40,7 @@ pub enum ErrorKind {
 
 /// Where an error lies.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// The file.
     pub path: PathBuf,
     /// Line and column in it, from one, where they are known.
@@ -50,7 +50,7 @@ pub struct Place {
 impl Error {
     /// Returns the error that `text` tells.
     pub fn new(text: impl Into<String>) -> Self {
-        Self { kind: ErrorKind::Other, place: None, text: text.into() }
+        Self { kind: ErrorKind::Other, location: None, text: text.into() }
     }
 
     /// Returns what is wrong with the file at `path`.
@@ -70,7 +70,7 @@ impl Error {
 
     /// Returns the same error, which lies at a line and column of the file at `path`, where they are known.
     pub(crate) fn in_file(self, path: impl Into<PathBuf>, line: Option<(usize, usize)>) -> Self {
-        Self { place: Some(Place { path: path.into(), line }), ..self }
+        Self { location: Some(Location { path: path.into(), line }), ..self }
     }
 
     /// Returns the same error, of another kind.
@@ -91,8 +91,8 @@ impl Error {
 
     /// Returns where it lies, where that is a file.
     #[must_use]
-    pub fn place(&self) -> Option<&Place> {
-        self.place.as_ref()
+    pub fn location(&self) -> Option<&Location> {
+        self.location.as_ref()
     }
 }
 

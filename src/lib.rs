@@ -118,6 +118,6 @@ mod random;
 mod toml_text;
 
 pub(crate) use error::error;
-pub use error::{Error, ErrorKind, Place};
+pub use error::{Error, ErrorKind, Location};
 pub use joint_matrix::JointMatrix;
 pub use joint_vector::{JointVector, MAX_JOINTS};

@@ -1,6 +1,6 @@
 //! Exceptions of the package: one kind for each thing that can be wrong, with file and line where there are such.
 
-use haptize::{Error as Failure, ErrorKind, gridize::GridizeError as GridizeFailure};
+use haptize::{Error as Failure, ErrorKind};
 use pyo3::{
     create_exception,
     exceptions::{PyException, PyValueError},
@@ -37,7 +37,7 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// A [`SceneError`].
 pub fn scene(py: Python<'_>, error: impl Into<Failure>) -> PyErr {
     let error = error.into();
-    let (path, place) = error.place().map_or((None, None), |place| (Some(&place.path), place.line));
+    let (path, place) = error.location().map_or((None, None), |at| (Some(&at.path), at.line));
     let raised = SceneError::new_err(error.to_string());
     let value = raised.value(py);
     let told = value
@@ -51,7 +51,7 @@ pub fn scene(py: Python<'_>, error: impl Into<Failure>) -> PyErr {
 pub fn dataset(py: Python<'_>, error: &Failure) -> PyErr {
     match error.kind() {
         ErrorKind::Scene => scene(py, error.clone()),
-        _ => with_path(py, error.to_string(), error.place().map(|place| place.path.as_path())),
+        _ => with_path(py, error.to_string(), error.location().map(|at| at.path.as_path())),
     }
 }
 
@@ -70,7 +70,7 @@ pub fn bake(error: &Failure) -> PyErr {
     BakeError::new_err(error.to_string())
 }
 
-pub fn gridize(error: &GridizeFailure) -> PyErr {
+pub fn gridize(error: &Failure) -> PyErr {
     GridizeError::new_err(error.to_string())
 }
 

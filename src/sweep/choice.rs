@@ -175,6 +175,13 @@ impl Backend for ChosenBackend<'_> {
         }
     }
 
+    fn threads(&self) -> usize {
+        match self {
+            Self::Cpu(cpu) => cpu.threads(),
+            Self::Gpu { solver, .. } => solver.threads(),
+        }
+    }
+
     fn left_to_cpu(&self) -> usize {
         match self {
             Self::Cpu(cpu) => cpu.left_to_cpu(),

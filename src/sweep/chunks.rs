@@ -148,9 +148,9 @@ struct ChunkSize {
 }
 
 impl ChunkSize {
-    /// Begins with the least, since nothing is known of the time yet. At most `most`.
-    fn new(most: usize) -> Self {
-        let least = most.min(SHARE * rayon::current_num_threads());
+    /// Begins with the least for `threads` threads, since nothing is known of the time yet. At most `most`.
+    fn new(most: usize, threads: usize) -> Self {
+        let least = most.min(SHARE * threads);
         Self { size: least, least, most }
     }
 
@@ -232,7 +232,7 @@ impl Sweep<'_> {
             cut: resumed,
             chunks: VecDeque::new(),
             given: 0,
-            size: ChunkSize::new(run.chunk.clamp(1, self.points().max(1))),
+            size: ChunkSize::new(run.chunk.clamp(1, self.points().max(1)), backend.threads()),
             run,
             tally,
             provenance,
@@ -447,9 +447,11 @@ impl Work for Course<'_, '_> {
 mod tests {
     use super::*;
 
+    const THREADS: usize = 3;
+
     /// After 40 chunks in which a configuration takes `each`: the time of a chunk, and its configurations.
     fn settled(each: Duration) -> (Duration, usize) {
-        let mut size = ChunkSize::new(1 << 14);
+        let mut size = ChunkSize::new(1 << 14, THREADS);
         for _ in 0..40 {
             size.adapt(size.size, each * size.size as u32);
         }
@@ -458,7 +460,7 @@ mod tests {
 
     #[test]
     fn chunks_take_about_a_quarter_of_a_second_however_long_a_configuration_takes() {
-        let least = SHARE * rayon::current_num_threads();
+        let least = SHARE * THREADS;
         assert_eq!(settled(Duration::from_micros(1)).1, 1 << 14);
         for each in [Duration::from_micros(30), Duration::from_micros(200), Duration::from_millis(1)] {
             let (time, size) = settled(each);
@@ -466,9 +468,9 @@ mod tests {
         }
         assert_eq!(settled(Duration::from_secs(9)).1, least);
         // A chunk that skips free points is no reason for a larger one.
-        let mut size = ChunkSize::new(1 << 14);
+        let mut size = ChunkSize::new(1 << 14, THREADS);
         size.adapt(1, Duration::ZERO);
         assert_eq!(size.size, least);
-        assert_eq!(ChunkSize::new(3).size, 3);
+        assert_eq!(ChunkSize::new(3, THREADS).size, 3);
     }
 }

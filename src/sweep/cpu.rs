@@ -48,12 +48,6 @@ impl<'a> CpuBackend<'a> {
         Ok(Self { pool, solvers })
     }
 
-    /// Number of threads.
-    #[must_use]
-    pub fn threads(&self) -> usize {
-        self.solvers.threads()
-    }
-
     /// A good [`super::Run::chunk`] for this backend.
     #[must_use]
     pub fn chunk(&self) -> usize {
@@ -83,6 +77,10 @@ impl<'a> CpuBackend<'a> {
 
 impl Backend for CpuBackend<'_> {
     type Error = Infallible;
+
+    fn threads(&self) -> usize {
+        self.solvers.threads()
+    }
 
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Infallible> {
         Ok(self.pool.install(|| self.solvers.map(configurations, |solver, q| solver.solve(q))))
