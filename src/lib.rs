@@ -120,4 +120,4 @@ mod toml_text;
 
 pub use csv::TableError;
 pub use joint_matrix::JointMatrix;
-pub use joint_vector::{JointVector, MAX_JOINTS};
+pub use joint_vector::{JointVector, MAX_AXES, MAX_JOINTS};

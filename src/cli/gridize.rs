@@ -8,7 +8,7 @@ use super::{
     watch,
 };
 use crate::{
-    MAX_JOINTS,
+    MAX_AXES,
     csv::TableError,
     dataset::{Axis, Dataset},
     gridize::{
@@ -242,11 +242,11 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
         };
     };
     let table = JointStateTable::open(log, topic)?;
-    if table.joints().len() > MAX_JOINTS {
+    if table.joints().len() > MAX_AXES {
         let names = table.joints().join(", ");
         let (file, many) = (log.display(), table.joints().len());
         return Err(format!(
-            "{file}: {} has {many} joints ({names}), more than {MAX_JOINTS}: choose some by a column mapping \
+            "{file}: {} has {many} joints ({names}), more than {MAX_AXES}: choose some by a column mapping \
              (--columns)",
             table.topic()
         )

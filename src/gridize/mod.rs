@@ -25,7 +25,7 @@ mod tetrahedra;
 pub use samples::{Samples, SamplesError};
 
 use crate::{
-    MAX_JOINTS,
+    MAX_AXES,
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
     scene::GRID_LINE,
@@ -314,7 +314,7 @@ fn fill<I: Interpolant>(interpolant: &I, cloud: &Cloud, grid: &Grid) -> (Vec<f64
     let blocks = torque.par_chunks_mut(BLOCK * joints).zip(inside.par_chunks_mut(BLOCK)).enumerate();
     blocks.for_each(|(block, (torque, inside))| {
         let mut walk = interpolant.walk();
-        let mut weights = Vec::with_capacity(MAX_JOINTS + 1);
+        let mut weights = Vec::with_capacity(MAX_AXES + 1);
         for (offset, (torque, inside)) in torque.chunks_exact_mut(joints).zip(inside).enumerate() {
             let q = grid.configuration(block * BLOCK + offset);
             interpolant.weights(&mut walk, &cloud.scaled(&q), &mut weights);

@@ -10,7 +10,7 @@ use super::{
     HULL_PULL,
     cloud::{JITTER, MERGE_DISTANCE},
 };
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 use spade::{
     DelaunayTriangulation, HasPosition, HierarchyHintGenerator, NaturalNeighbor, Point2, PositionInTriangulation,
     Triangulation as _, handles::FixedVertexHandle,
@@ -71,7 +71,7 @@ impl Triangulation for Plane<'_> {
             }
             PositionInTriangulation::OutsideOfConvexHull(_) | PositionInTriangulation::NoTriangulation => return None,
         };
-        let mut simplex = [0; MAX_JOINTS + 1];
+        let mut simplex = [0; MAX_AXES + 1];
         for (entry, vertex) in simplex.iter_mut().zip(face.vertices()) {
             *entry = vertex.data().point;
         }

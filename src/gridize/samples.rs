@@ -1,6 +1,6 @@
 //! Scattered measurements of a contact torque: what a scan or an imported log hands to the gridization.
 
-use crate::{MAX_JOINTS, dataset::JointLabel, names, random::mix};
+use crate::{MAX_AXES, dataset::JointLabel, names, random::mix};
 
 /// Scattered configurations q with the contact torque tau measured at each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,7 +20,7 @@ pub struct Samples {
 #[non_exhaustive]
 pub enum SamplesError {
     /// No joint, or more than the engine has room for.
-    #[error("the measurements have {0} joints; between 1 and {MAX_JOINTS} can be gridized")]
+    #[error("the measurements have {0} joints; between 1 and {MAX_AXES} can be gridized")]
     Joints(usize),
     /// Columns of different lengths.
     #[error("{what} holds {have} numbers where the configurations hold {need}: every sample needs one a joint")]
@@ -94,7 +94,7 @@ impl Samples {
     /// [`SamplesError`] names the column and the sample.
     pub fn check(&self) -> Result<(), SamplesError> {
         let joints = self.joints.len();
-        if !(1..=MAX_JOINTS).contains(&joints) {
+        if !(1..=MAX_AXES).contains(&joints) {
             return Err(SamplesError::Joints(joints));
         }
         self.joints.iter().try_for_each(|joint| names::check(&joint.name)).map_err(SamplesError::Name)?;

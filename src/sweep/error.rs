@@ -1,7 +1,7 @@
 //! Why a sweep ended early, what was kept of it, and what to do.
 
 use super::measured::MOST_CONFIGURATIONS;
-use crate::{dataset, memory::Shortage};
+use crate::{MAX_AXES, dataset, memory::Shortage};
 use std::{
     collections::TryReserveError,
     io,
@@ -15,6 +15,15 @@ pub enum SweepError {
     /// The scene has no grid.
     #[error("the scene leaves the grid out; `haptize reach SCENE --write` finds one and writes it there")]
     NoGrid,
+    /// No grid has so many axes.
+    #[error(
+        "an arm of {joints} joints is too many for a grid, which has at most {MAX_AXES} axes; `haptize play SCENE` and \
+         `haptize view SCENE` solve its contact in every tick"
+    )]
+    Joints {
+        /// Joints of the arm.
+        joints: usize,
+    },
     /// Invalid grid.
     #[error("the scene's grid: {0}; correct `axes` of [grid] in the scene")]
     Grid(String),

@@ -17,6 +17,7 @@ use super::{
     tally::Tally,
 };
 use crate::{
+    MAX_AXES,
     contact::{MeshRipple, Model},
     dataset::{self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target},
     memory,
@@ -459,7 +460,14 @@ impl<'a> Sweep<'a> {
 
 /// Checks that `scene` has a grid.
 pub(super) fn check_given(scene: &Scene) -> Result<(), SweepError> {
+    check_axes(scene)?;
     if scene.grid.axes.is_empty() { Err(SweepError::NoGrid) } else { Ok(()) }
+}
+
+/// Checks that the arm has no more joints than a grid has axes.
+pub(super) fn check_axes(scene: &Scene) -> Result<(), SweepError> {
+    let joints = scene.proxy.joints.len();
+    if joints > MAX_AXES { Err(SweepError::Joints { joints }) } else { Ok(()) }
 }
 
 /// Checks that no other process writes the file `output`: it would be lost, or the dataset written over.

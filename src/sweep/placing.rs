@@ -1,6 +1,6 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::{BakeError, build_object};
+use super::{BakeError, build_object, grid_sweep::check_axes};
 use crate::{
     JointVector,
     contact::{Model, Proximity},
@@ -65,6 +65,7 @@ impl Placing {
         | Shape::Icosphere { centre, .. }
         | Shape::Mesh { centre, .. }
         | Shape::Tetrahedra { centre, .. }) = scene.object.shape;
+        check_axes(scene)?;
         let object = build_object(scene)?;
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.

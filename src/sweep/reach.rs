@@ -5,7 +5,7 @@
 //! most as deep as asked for; the grid's ranges are the least box that holds all of it that was met. Its lines are so
 //! far apart that a step along any axis moves the proxy by about as much as along any other.
 
-use super::{BakeError, build_object, spacing};
+use super::{BakeError, build_object, grid_sweep::check_axes, spacing};
 use crate::{
     JointVector,
     contact::{Model, NodeTree},
@@ -149,6 +149,7 @@ impl Reach {
     /// # Errors
     /// Any [`ReachError`].
     pub fn new(scene: &Scene, depth: Option<f64>, stop: &AtomicBool) -> Result<Self, ReachError> {
+        check_axes(scene).map_err(BakeError::from)?;
         let object = build_object(scene).map_err(BakeError::from)?;
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
