@@ -1,11 +1,19 @@
 //! Why a sweep ended early, what was kept of it, and what to do.
 
-use crate::{Error, ErrorKind, error};
+use crate::{Error, ErrorKind, MAX_AXES, error};
 use std::{fmt::Display, io, path::Path};
 
 /// The scene's grid cannot be swept.
 pub(super) fn in_grid(what: impl Display) -> Error {
     error!("the scene's grid: {what}; correct `axes` of [grid] in the scene")
+}
+
+/// An arm has more joints than a grid has axes.
+pub(super) fn too_many_joints(joints: usize) -> Error {
+    error!(
+        "an arm of {joints} joints is too many for a grid, which has at most {MAX_AXES} axes; `haptize play SCENE` and \
+         `haptize view SCENE` solve its contact in every tick"
+    )
 }
 
 /// The columns of `points` grid points, of so many `bytes`, do not fit in memory.
