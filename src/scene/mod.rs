@@ -6,6 +6,7 @@
 mod check;
 mod contact;
 mod device;
+mod edit;
 mod effects;
 mod effort;
 mod error;
@@ -28,6 +29,7 @@ mod value;
 
 pub use contact::{ContactLaw, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
+pub use edit::SceneText;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
 pub use error::{Diagnostic, SceneError};
@@ -41,12 +43,14 @@ pub use haptics::{
 };
 pub use motion::{MotionSpec, Waypoint};
 pub use object::{
-    ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape,
-    SpringKind, SpringSpec,
+    ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec,
+    Placement, Shape, SpringKind, SpringSpec,
 };
 pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 pub use relaxation::{MOST_TERMS, RelaxationSpec};
-pub use scan::{Cover, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan};
+pub use scan::{
+    Cover, HistorySpec, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan,
+};
 pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
 pub use skin::SkinSpec;
 

@@ -57,6 +57,7 @@ pub use merge::{Merge, MergeError, Merged};
 pub use pilot::{Aim, AimError, Choice, Cost, Pilot, PilotError, Prospect, Trial};
 pub use placing::Placing;
 pub use plan::{Plan, ShardCost};
+pub(crate) use reach::shallow;
 pub use reach::{DepthShare, JointReach, Reach, ReachError};
 pub use reference::{REFERENCE_TOLERANCE, ReferenceError};
 pub use report::{Iterations, SweepReport};

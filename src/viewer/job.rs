@@ -280,7 +280,7 @@ fn is_cancelled(error: &(dyn Error + 'static)) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{object::Object, scene::Shape};
+    use crate::{object::Object, scene::Placement, scene::Shape};
 
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
@@ -302,8 +302,8 @@ mod tests {
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let mut scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let surface = Surface::of(&Object::build(&scene.object).unwrap());
-        let (file, centre) = ("gone.obj".into(), glam::DVec3::ZERO);
-        scene.object.shape = Shape::Mesh { file, scale: 1.0, centre, refine: None };
+        let file = "gone.obj".into();
+        scene.object.shape = Shape::Mesh { file, placement: Placement::METRES, refine: None };
         scene.grid.axes.iter_mut().for_each(|axis| axis.count = 2);
         let bake = |surface| {
             let task = Task::Bake(Arc::new(scene.clone()), surface);

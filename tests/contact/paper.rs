@@ -63,7 +63,7 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     let PlanSpec::Workspace(plan) = &mut part.scan.plan else { unreachable!() };
     (plan.start.y, plan.across[0].count, plan.across[1].count) = (-0.012, 5, 8);
     let chain = Chain::new(&part.proxy);
-    let plan = Plan::new(&part.scan.plan, &chain).unwrap();
+    let plan = Plan::new(&part.scan, &chain).unwrap();
     let mut rig = SimulatedRig::new(&part.proxy, &part.scan.simulated, plan.stops[0].q, 1);
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("log.csv");
