@@ -11,17 +11,21 @@
 
 mod barycentric;
 mod cloud;
+mod energy;
 mod hyperspace;
 mod interpolant;
 mod line;
+mod memory;
 mod order;
 mod plane;
 pub mod prediction;
+mod relaxation;
 mod samples;
 mod smooth;
 mod space;
 mod tetrahedra;
 
+pub use memory::{History, Past, gridize_remembering, predict_histories};
 pub use samples::{Samples, SamplesError};
 
 use crate::{
@@ -176,6 +180,24 @@ pub enum GridizeError {
         /// The limit.
         limit: usize,
     },
+    /// Nothing of the histories can be compared.
+    #[error(
+        "no history has rows that count inside the grid: take a smaller step, so that it reaches farther, or record in \
+         the middle of the range"
+    )]
+    NoHistory,
+    /// Nothing fades.
+    #[error(
+        "no relaxation is found: the torque does not fade measurably while the object is held; leave it out, or hold \
+         longer"
+    )]
+    NoRelaxation,
+    /// Gridizing and identifying do not come to an end.
+    #[error("relaxation was still changing after {0} rounds: take a larger step, so that each cell holds more rows")]
+    Unsettled(usize),
+    /// The gridized torque has no potential.
+    #[error("the gridized torque cannot be interpolated: {0}")]
+    Field(String),
     /// Nothing says how far smoothing may go.
     #[error("smoothing needs the standard deviation of the samples, and none was measured: leave it out")]
     NoDeviations,
