@@ -120,7 +120,7 @@ pub enum SweepError {
     },
     /// A part is there already, and was not to be continued.
     #[error(
-        "{path}: holds what an unfinished bake has solved; add --resume to go on with it, or delete it to begin anew"
+        "{path}: holds what an unfinished bake has solved; add --resume to go on with it, or delete it to start again"
     )]
     Unfinished {
         /// The part.
@@ -137,7 +137,7 @@ pub enum SweepError {
         reason: String,
     },
     /// The part of another sweep.
-    #[error("{path}: cannot be continued, it was begun with {difference}; restore that, or delete it to begin anew")]
+    #[error("{path}: cannot be continued, it was begun with {difference}; restore that, or delete it to start again")]
     OtherPart {
         /// The part.
         path: PathBuf,

@@ -91,7 +91,7 @@ pub enum MergeError {
         source: io::Error,
     },
     /// A file that is no shard.
-    #[error("{path}: is no shard: {reason}; leave it out, or solve it anew with `haptize bake --shard`")]
+    #[error("{path}: is not a shard: {reason}; leave it out, or solve it again with `haptize bake --shard`")]
     NoShard {
         /// Its path.
         path: PathBuf,
