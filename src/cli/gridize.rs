@@ -5,7 +5,7 @@ use super::{
     bar::Bar,
     output::{self, Content, Folder, Overwritten, Replaced},
     report::{self, Describe, Report, Text},
-    watch,
+    tell, watch,
 };
 use crate::{
     Error, MAX_AXES,
@@ -201,7 +201,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         of: source.of,
         axes: dataset.grid.axes,
     };
-    Report::new(&gridized)
+    if gridized.report.contact_points == 0 {
+        tell(format_args!(
+            "haptize: nothing touches: no torque is above the threshold at any grid point; check the units of the log, or \
+             lower --epsilon"
+        ));
+    }
+    Report::of(&gridized, gridized.report.contact_points > 0)
 }
 
 /// Measurements made a dataset.

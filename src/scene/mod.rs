@@ -56,6 +56,7 @@ pub use skin::SkinSpec;
 
 pub(crate) use inertia::positive_semidefinite;
 
+use crate::names;
 use check::Checker;
 use clap::ValueEnum as _;
 use std::path::{Path, PathBuf};
@@ -141,7 +142,8 @@ impl Scene {
             Shape::Sphere { .. } | Shape::Icosphere { .. } => return Ok(scene),
         };
         if let Err(error) = std::fs::metadata(file) {
-            let message = format!("the mesh file {} cannot be opened: {error}", file.display());
+            let message =
+                format!("the mesh file {} cannot be opened: {error}", names::escaped(&file.to_string_lossy()));
             return Err(Checker { path, text: &text }.at(place, message));
         }
         Ok(scene)
