@@ -100,6 +100,8 @@ pub mod render;
 pub mod draw;
 pub mod report;
 
+pub mod paper;
+
 pub mod studies;
 
 #[cfg(feature = "viewer")]

@@ -7,6 +7,7 @@
 
 mod field;
 mod haptic_loop;
+mod live;
 mod outcome;
 mod solver;
 
@@ -18,6 +19,7 @@ pub use haptic_loop::{
     hz_gains, hz_loop, hz_loop_close, hz_loop_fault, hz_loop_joints, hz_loop_open, hz_loop_period, hz_loop_start,
     hz_loop_tick, hz_tick,
 };
+pub use live::{hz_live, hz_live_close, hz_live_joints, hz_live_open, hz_live_sample};
 pub use outcome::hz_code;
 pub use solver::{
     hz_equilibrium, hz_force, hz_solver, hz_solver_close, hz_solver_joints, hz_solver_open, hz_solver_solve,

@@ -9,17 +9,20 @@ use super::{
 };
 use crate::{
     Error, MAX_JOINTS,
-    dataset::{Axis, Dataset},
+    dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
-        GridizeOptions, GridizeReport, Interpolation, Samples, gridize,
+        GridizeOptions, GridizeReport, History, Interpolation, Past, Samples, gridize, gridize_remembering,
+        predict_histories,
         prediction::{Prediction, held_out, predict},
     },
     input,
     logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
+    proxy::Chain,
     report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
-    scan::{RowStatus, ScanLog},
+    scan::{RowStatus, ScanLog, add_slip, identify_friction},
     scene::{Rendering, ScanScene},
+    toml_text::{self, coarse, significant},
 };
 use serde::Serialize;
 use std::{
@@ -98,13 +101,29 @@ pub struct Source {
     /// Both directions of motion, and the joint whose direction it is.
     branches: Option<([Samples; 2], usize)>,
     left_out: usize,
+    /// What tells how the object relaxes, where something does.
+    past: Option<(Vec<History>, Past)>,
+    /// Friction of the object, and the arm and its node that felt it.
+    friction: Option<(IdentifiedFriction, Chain, usize)>,
 }
 
 impl Source {
-    /// Gridizes the samples; the dataset says where they come from, and that it was made now.
+    /// Gridizes the samples; the dataset says where they come from, and that it was made now. Where something tells how
+    /// the object relaxes, its scene names it.
     pub fn gridize(&self, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), Failure> {
-        let (mut dataset, report) = gridize(&self.samples, options)?;
+        let (mut dataset, report) = match &self.past {
+            Some((histories, past)) => gridize_remembering(&self.samples, (histories, *past), options)?,
+            None => gridize(&self.samples, options)?,
+        };
         dataset.scene.clone_from(&self.scene);
+        if let Some((friction, chain, node)) = &self.friction {
+            add_slip(&mut dataset, chain, *node);
+            dataset.provenance.friction = Some(*friction);
+        }
+        if !self.scene.is_empty() {
+            dataset.scene += &identified(&dataset.provenance)?;
+            Rendering::parse(&dataset.scene, "scene")?;
+        }
         dataset.provenance.backend = self.kind.to_owned();
         dataset.provenance.adapter.clone_from(&self.of);
         dataset.provenance.date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
@@ -147,11 +166,20 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         )
         .into());
     }
+    let is_log = source.past.as_ref().is_some_and(|(_, past)| *past == Past::Log);
+    if arguments.held_out.is_some() && is_log {
+        return Err("the rows of a log in which the object relaxes depend on one another: hold out a whole log, by \
+                    --against, and not --held-out"
+            .into());
+    }
     let held_out = arguments.held_out.map(|share| held_out(&source.samples, &options, share)).transpose()?;
-    let against = match arguments.against.as_slice() {
+    let other = match arguments.against.as_slice() {
         [] => None,
-        logs => Some(predict(&dataset, &read(logs, mapping.as_ref())?.samples)?),
+        logs => Some(read(logs, mapping.as_ref())?),
     };
+    let against = other.as_ref().filter(|_| !is_log).map(|other| predict(&at_rest(&dataset), &other.samples));
+    let history_misfit = other.iter().filter(|_| is_log).flat_map(|other| &other.past);
+    let history_misfit = history_misfit.map(|(other, _)| predict_histories(&dataset, other)).next().transpose()?;
     dataset.save(&output)?;
     let figures = figures(arguments, &source, &dataset)?;
     let gridized = Gridized {
@@ -162,7 +190,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         import: source.import,
         left_out: source.left_out,
         held_out,
-        against,
+        against: against.transpose()?,
+        relaxation: dataset.provenance.relaxation.clone(),
+        friction: dataset.provenance.friction,
+        history_misfit,
         folder: folder.map(|folder| folder.close(&figures)).transpose()?,
         figures: report::names(&figures),
         replaced,
@@ -190,6 +221,15 @@ struct Gridized {
     left_out: usize,
     held_out: Option<Prediction>,
     against: Option<Prediction>,
+    /// How the object relaxes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relaxation: Option<IdentifiedRelaxation>,
+    /// Its friction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    friction: Option<IdentifiedFriction>,
+    /// Predicted less measured over measured torque of other logs in which it relaxes, rms (1).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    history_misfit: Option<f64>,
     figures: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     folder: Option<Overwritten>,
@@ -200,6 +240,30 @@ struct Gridized {
     of: String,
     #[serde(skip)]
     axes: Vec<Axis>,
+}
+
+/// The lines of a scene that name what was identified of its object.
+fn identified(provenance: &Provenance) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    if let Some(found) = &provenance.relaxation {
+        toml_text::heading(&mut text, "Identified by haptize gridize")?;
+        text += "[object.relaxation]\n";
+        let term = |[share, time]: &[f64; 2]| format!("[{}, {}]", significant(*share), significant(*time));
+        toml_text::entry(&mut text, "terms", &toml_text::list(&found.terms, term), "share of the force, and time [s]")?;
+    }
+    if let Some(found) = &provenance.friction {
+        text += "\n[haptics.friction]\n";
+        toml_text::entry(&mut text, "coefficient", &significant(found.coefficient), "identified by haptize gridize")?;
+    }
+    Ok(text)
+}
+
+/// The torque of `dataset` where all that fades has faded.
+fn at_rest(dataset: &Dataset) -> Dataset {
+    let fading = |relaxation: &IdentifiedRelaxation| relaxation.terms.iter().map(|[share, _]| share).sum::<f64>();
+    let lasting = 1.0 - dataset.provenance.relaxation.as_ref().map_or(0.0, fading);
+    let torque = dataset.torque.iter().map(|torque| lasting * torque).collect();
+    Dataset::bare(dataset.grid.clone(), torque, dataset.status.to_vec())
 }
 
 fn figures(arguments: &Arguments, source: &Source, dataset: &Dataset) -> Result<Vec<PathBuf>, Failure> {
@@ -264,9 +328,16 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
         return Err("several logs can be gridized together only with --columns".into());
     };
     let log = ScanLog::read(path)?;
-    let left_out = log.rows.iter().filter(|row| row.status != RowStatus::Steady).count();
+    let left_out = log.rows.iter().filter(|row| matches!(row.status, RowStatus::Unsteady | RowStatus::Limit));
+    let left_out = left_out.count();
+    let histories = log.histories();
     let kind = if log.header.simulated { "simulated scan" } else { "scan" };
-    let epsilon = Some(ScanScene::parse(&log.header.scene, path)?.scan.control.epsilon);
+    let scene = ScanScene::parse(&log.header.scene, path)?;
+    let epsilon = Some(scene.scan.control.epsilon);
+    let chain = Chain::new(&scene.proxy);
+    let friction = identify_friction(&log, &scene.scan, &chain);
+    let node = scene.scan.plan.node(chain.nodes.len());
+    let friction = friction.map(|friction| (friction, chain, node));
     Ok(Source {
         samples: log.samples(),
         scene: log.header.scene,
@@ -276,6 +347,8 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
         import: None,
         branches: None,
         left_out,
+        past: (!histories.is_empty()).then_some((histories, Past::Presses)),
+        friction,
     })
 }
 
@@ -285,7 +358,7 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let mut progress = |progress: ImportProgress| bar.set(progress.bytes, total, format!("{} rows", progress.rows));
     let imported = import(mapping, logs, &mut progress);
     bar.finish();
-    let Imported { samples, branches, report } = imported?;
+    let Imported { samples, branches, histories, report } = imported?;
     let left_out = report.dropped.iter().map(|dropped| dropped.rows as usize).sum();
     let names: Vec<String> = logs.iter().map(|log| log.display().to_string()).collect();
     Ok(Source {
@@ -297,6 +370,8 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
         import: Some(report),
         branches: branches.map(|branches| (branches, mapping.lead())),
         left_out,
+        past: (!histories.is_empty()).then_some((histories, Past::Log)),
+        friction: None,
     })
 }
 
@@ -308,6 +383,31 @@ fn scene(path: &PathBuf, joints: usize) -> Result<String, Failure> {
         return Err(format!("{}: its proxy has {count} joints, the samples {joints}", path.display()).into());
     }
     Ok(scene.text)
+}
+
+impl Describe for IdentifiedRelaxation {
+    fn describe(&self, text: &mut Text) {
+        let Self { terms, histories, misfit, held_out } = self;
+        let term = |[share, time]: &[f64; 2]| format!("{:.1} % in {} s", 100.0 * share, coarse(*time));
+        let terms = terms.iter().map(term).collect::<Vec<_>>().join(", ");
+        let out = held_out.map(|held_out| format!(", to {:.1} % of those held out", 100.0 * held_out));
+        text.row("relaxes", terms);
+        text.row(
+            "",
+            format_args!(
+                "told by {histories} histories to {:.1} % of their torque, rms{}",
+                100.0 * misfit,
+                out.unwrap_or_default()
+            ),
+        );
+    }
+}
+
+impl Describe for IdentifiedFriction {
+    fn describe(&self, text: &mut Text) {
+        let Self { coefficient, strokes, deviation } = self;
+        text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes to and fro"));
+    }
 }
 
 impl Describe for Gridized {
@@ -351,6 +451,11 @@ impl Describe for Gridized {
                 let (rms, worst, unit) = (rms[joint], worst[joint], axis.effort_unit());
                 text.row(&axis.name, format_args!("to {rms:.4} {unit} rms, {worst:.4} at worst{beside}"));
             }
+        }
+        self.relaxation.describe(text);
+        self.friction.describe(text);
+        if let Some(misfit) = self.history_misfit {
+            text.row("against", format_args!("memory included, to {:.1} % of the torque, rms", 100.0 * misfit));
         }
         if let Some(folder) = self.figures.first().and_then(|figure| Path::new(figure).parent()) {
             text.row("figures", format_args!("{} files in {}", self.figures.len(), folder.display()));

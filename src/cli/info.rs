@@ -160,6 +160,8 @@ pub fn describe_absent(text: &mut Text, absent: &[&str]) {
 impl Describe for Provenance {
     fn describe(&self, text: &mut Text) {
         self.mesh_ripple.describe(text);
+        self.relaxation.describe(text);
+        self.friction.describe(text);
         describe_error(text, self.error.as_ref(), self.aim);
         let [date, version, algorithm, backend, adapter] =
             [&self.date, &self.version, &self.algorithm, &self.backend, &self.adapter].map(|text| escaped(text));

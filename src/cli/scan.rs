@@ -128,6 +128,9 @@ impl Describe for Scanned {
                 text.row("note", format_args!("{count} points {what}"));
             }
         }
+        if let Some(histories) = report.histories {
+            text.row("recorded", format_args!("{histories} presses, of which gridize learns memory and friction"));
+        }
         next.iter().for_each(|command| text.row("interrupted", format_args!("continue: {command}")));
     }
 }
@@ -142,7 +145,7 @@ fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<R
         return Err(format!("cannot rest for {dwell} s at each point: give --dwell between 0 and {LONGEST}").into());
     }
     let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain)?;
+    let plan = Plan::new(&scene.scan, &chain)?;
     let trajectory = Trajectory::new(&plan, control.speed, dwell);
     let joints = labels(&chain);
     let written = replace_file(file, |out| match output::is_mcap(file) {
@@ -249,7 +252,7 @@ fn drive(
 /// The arm of `scene`, and where it goes.
 fn planned(scene: &ScanScene) -> Result<(Chain, Plan), Failure> {
     let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain)?;
+    let plan = Plan::new(&scene.scan, &chain)?;
     Ok((chain, plan))
 }
 

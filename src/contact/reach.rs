@@ -97,7 +97,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
 
 /// Whether the compliance covers all that a result depends on whose forces are on the object's nodes `loaded` and on the
 /// proxy's nodes `touching`, where no point of the surface has moved by more than `moved` (m).
-pub(super) fn covers(
+pub(crate) fn covers(
     model: &Model<'_>,
     detection: &Detection,
     mut loaded: impl Iterator<Item = u32>,

@@ -29,6 +29,31 @@ pub struct MeasuredError {
     pub friction: Option<FrictionExcess>,
 }
 
+/// How a measured object relaxes, identified from recorded histories.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiedRelaxation {
+    /// Share of the force that fades, and the time in which it does (1, s).
+    pub terms: Vec<[f64; 2]>,
+    /// Histories that it was identified from.
+    pub histories: usize,
+    /// Predicted less measured torque over measured torque, rms over these (1).
+    pub misfit: f64,
+    /// The same over a quarter of them, predicted from the rest; absent where the samples are the histories.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<f64>,
+}
+
+/// Friction of a measured object, identified from recorded strokes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IdentifiedFriction {
+    /// Tangential over normal force while slipping (1).
+    pub coefficient: f64,
+    /// Strokes to and fro that it is the mean of.
+    pub strokes: usize,
+    /// Standard deviation from stroke to stroke (1).
+    pub deviation: f64,
+}
+
 /// Difference of contact with the surface at rest from contact with the deformed surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GeometryError {

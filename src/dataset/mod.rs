@@ -23,7 +23,9 @@ mod stored;
 mod summary;
 mod surface;
 
-pub use accuracy::{FrictionExcess, GeometryError, InterpolationError, MeasuredError};
+pub use accuracy::{
+    FrictionExcess, GeometryError, IdentifiedFriction, IdentifiedRelaxation, InterpolationError, MeasuredError,
+};
 pub(crate) use atomic::BUFFER;
 pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
 pub use claim::Claim;
@@ -145,6 +147,12 @@ pub struct Provenance {
     /// How much a contact point feels the mesh; absent where nothing was solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh_ripple: Option<MeshRipple>,
+    /// How the measured object relaxes, where that was identified.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relaxation: Option<IdentifiedRelaxation>,
+    /// Its friction, likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<IdentifiedFriction>,
     /// Where the grid was chosen for an error, that error: rms, over the rms of the torque (1).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub aim: Option<f64>,

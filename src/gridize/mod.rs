@@ -11,17 +11,21 @@
 
 mod barycentric;
 mod cloud;
+mod energy;
 mod hyperspace;
 mod interpolant;
 mod line;
+mod memory;
 mod order;
 mod plane;
 pub mod prediction;
+mod relaxation;
 mod samples;
 mod smooth;
 mod space;
 mod tetrahedra;
 
+pub use memory::{History, Past, gridize_remembering, predict_histories};
 pub use samples::Samples;
 
 use crate::{

@@ -81,6 +81,8 @@ impl Mapping {
             let known = joints.iter().any(|joint| joint.name == *lead);
             refuse(!known, "torque.lead", format!("torque.lead: no joint `{lead}`"))?;
         }
+        let message = "torque.relaxes needs every row with its time: set torque.keep to \"all\"";
+        refuse(torque.relaxes && torque.keep != Keep::All, "torque.keep", message)?;
         let cells = torque.cell.len() == count && torque.cell.iter().all(|&side| is_positive(side));
         let message = format!("torque.cell must hold {count} positive numbers, one a joint, to average rows");
         refuse(torque.keep != Keep::All && !cells, "torque.cell", message)

@@ -146,6 +146,9 @@ pub struct Torque {
     pub lead: Option<String>,
     /// Speed of the lead joint below which it counts as still (rad/s or m/s).
     pub still: f64,
+    /// Whether the object relaxes: rows are kept with their times then, and `gridize` identifies how its force fades. It
+    /// needs `keep = "all"`, and a log in which each segment begins untouched.
+    pub relaxes: bool,
     /// Rows are averaged in cells of C-space with these sides, one a joint (rad or m); needed for all but `all`.
     pub cell: Vec<f64>,
 }

@@ -23,7 +23,7 @@ pub use units::ColumnUnit;
 
 use crate::{
     Error, JointVector, error,
-    gridize::Samples,
+    gridize::{History, Samples},
     input,
     ros::{JointStateTable, is_mcap},
 };
@@ -117,6 +117,8 @@ pub struct Imported {
     pub samples: Samples,
     /// Both branches, moving forward and backward, where rows were averaged by direction.
     pub branches: Option<[Samples; 2]>,
+    /// Every row with its time, a segment each, where the mapping says that the object relaxes.
+    pub histories: Vec<History>,
     /// Report of the import.
     pub report: ImportReport,
 }
@@ -184,6 +186,7 @@ struct Import<'a> {
     block: Block,
     cells: Cells,
     samples: Samples,
+    histories: Vec<History>,
     report: ImportReport,
 }
 
@@ -191,6 +194,7 @@ struct Import<'a> {
 #[derive(Clone, Copy)]
 struct Block {
     count: usize,
+    time: f64,
     q: JointVector,
     torque: JointVector,
     speed: JointVector,
@@ -199,12 +203,13 @@ struct Block {
 impl Block {
     fn new(joints: usize) -> Self {
         let zeros = JointVector::zeros(joints);
-        Self { count: 0, q: zeros, torque: zeros, speed: zeros }
+        Self { count: 0, time: 0.0, q: zeros, torque: zeros, speed: zeros }
     }
 
     fn add(&mut self, seen: &Seen) {
         self.count += 1;
         let share = 1.0 / self.count as f64;
+        self.time += share * (seen.row.time - self.time);
         for (mean, value) in
             [(&mut self.q, &seen.row.q), (&mut self.torque, &seen.row.torque), (&mut self.speed, &seen.speed)]
         {
@@ -222,6 +227,7 @@ impl<'a> Import<'a> {
             block: Block::new(joints),
             cells: Cells::new(&mapping.torque.cell),
             samples: Samples { joints: mapping.labels(), ..Samples::default() },
+            histories: vec![History::default()],
             report: ImportReport::default(),
         }
     }
@@ -276,6 +282,9 @@ impl<'a> Import<'a> {
         }
         self.end_block()?;
         self.cells.end_visit();
+        if self.histories.last().is_some_and(|history| !history.times.is_empty()) {
+            self.histories.push(History::default());
+        }
         Ok(())
     }
 
@@ -308,6 +317,12 @@ impl<'a> Import<'a> {
                 }
                 self.samples.configurations.extend_from_slice(&block.q);
                 self.samples.torques.extend_from_slice(&block.torque);
+                if let Some(history) = self.histories.last_mut().filter(|_| self.mapping.torque.relaxes) {
+                    history.times.push(block.time);
+                    history.configurations.extend_from_slice(&block.q);
+                    history.torques.extend_from_slice(&block.torque);
+                    history.counts.push(true);
+                }
                 Ok(())
             }
             Keep::Static if at_rest => self.cells.add(&block.q, &block.torque, Direction::Forward),
@@ -349,7 +364,8 @@ impl<'a> Import<'a> {
                 self.report.left_out()
             ));
         }
-        Ok(Imported { samples: self.samples, branches, report: self.report })
+        self.histories.retain(|history| !history.times.is_empty());
+        Ok(Imported { samples: self.samples, branches, histories: self.histories, report: self.report })
     }
 }
 

@@ -10,6 +10,7 @@ mod body;
 mod compliance;
 mod condensation;
 mod crossing;
+mod draft;
 mod element;
 mod factor;
 mod ground;
@@ -34,9 +35,10 @@ mod topology;
 pub use attachment::Attachment;
 pub use body::Body;
 pub use compliance::Compliance;
+pub use draft::{Draft, LengthUnit};
 pub use factor::Factor;
 pub(crate) use icosphere::generate as icosphere;
-pub(crate) use import::{MOST_METRES, length, read as read_surface};
+pub(crate) use import::{MOST_METRES, corners, length, read as read_surface};
 pub use lattice_error::LatticeError;
 pub use settled::settled;
 pub use skin::Skin;
@@ -115,15 +117,15 @@ impl Object {
                 check_count(divisions.saturating_mul(*divisions).saturating_mul(10).saturating_add(2))?;
                 Body::shell(icosphere::generate(*centre, *radius, *divisions)?)
             }
-            Shape::Mesh { file, scale, centre, refine } => {
-                let mut shell = import::read(file, *scale, *centre, &mut warnings)?;
+            Shape::Mesh { file, placement, refine } => {
+                let mut shell = import::read(file, placement, &mut warnings)?;
                 if let Some(edge) = refine {
                     let refuse = |defect: String| refused(spec, &defect);
                     shell = refine::refine(shell, *edge, &mut warnings, refuse)?;
                 }
                 Body::shell(shell)
             }
-            Shape::Tetrahedra { file, scale, centre } => {
+            Shape::Tetrahedra { file, placement } => {
                 let inclusions = match &spec.material {
                     Material::Elastic(elastic) => &elastic.inclusions[..],
                     _ => &[],
@@ -133,7 +135,7 @@ impl Object {
                     InclusionPlace::Sphere { .. } => None,
                 };
                 let wanted: Vec<u32> = inclusions.iter().filter_map(region).collect();
-                import::read_tetrahedra(file, *scale, *centre, &wanted, &mut warnings)?
+                import::read_tetrahedra(file, placement, &wanted, &mut warnings)?
             }
         };
         Self::assemble(spec, body, warnings)

@@ -6,6 +6,7 @@ mod columns;
 mod contact_forces;
 pub mod control;
 pub mod coupling;
+pub mod driven;
 pub mod flags;
 mod force_rows;
 mod friction;

@@ -239,7 +239,7 @@ fn haptic_loop(
         };
         let message = format!(
             "{name} needs to know how contacts slip, which the dataset does not hold: bake a virtual object again with \
-             this scene; for a real object, which tells no contacts, leave {name} out"
+             this scene; scan a real one with strokes aside ([scan.history]), or leave {name} out"
         );
         return Err(refused(scene, place, message));
     }

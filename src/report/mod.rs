@@ -7,7 +7,6 @@ pub mod gridized;
 pub mod hysteresis;
 pub mod jitter;
 pub mod object;
-pub mod paper;
 pub mod press;
 pub mod slices;
 pub mod space;

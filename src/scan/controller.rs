@@ -4,7 +4,7 @@
 //! The torque that is commanded is taken for the measured one. So a scan ends when the device holds less than that: by
 //! a clamp in size, warm motors, or a stop. The ramp at the start is over long before the first measurement.
 
-use super::{PdControl, PdOutput, RowStatus, ScanRow, Steadiness, Stop};
+use super::{PdControl, PdOutput, RowStatus, ScanRow, Steadiness, Stop, plan::Recorded};
 use crate::{
     JointVector,
     control::Controller,
@@ -17,6 +17,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Acceleration of gravity (m/s^2), standard value.
 pub const GRAVITY: f64 = 9.806_65;
+
+/// Time that a row of a recorded press averages, and what it may be more of the time since the device arrived, as the
+/// object's force changes ever more slowly (s, 1).
+const RECORD_TIME: f64 = 5e-3;
+const RECORD_SHARE: f64 = 0.1;
 
 /// Time for which a device is braked after a limit (s): several time constants of damping against inertia.
 const BRAKE_TIME: f64 = 0.3;
@@ -68,6 +73,11 @@ enum Stage {
         steady: Option<bool>,
     },
     Averaging,
+    /// At a stop that is recorded, since this time.
+    Holding {
+        arrived: f64,
+        recorded: Recorded,
+    },
     /// After a limit: damping alone, for so many more ticks.
     Braking(Limit, usize),
     Over,
@@ -121,8 +131,8 @@ impl<'a> ScanController<'a> {
             chain,
             route,
             stop,
-            control: PdControl::new(control.stiffness, control.damping, control.speed, zero),
-            brake: PdControl::new(zero, control.damping, 0.0, zero),
+            control: PdControl::new(control.stiffness, control.damping, zero),
+            brake: PdControl::new(zero, control.damping, zero),
             steady: Steadiness::new(ticks, control.still, control.drift),
             pose: chain.new_pose(),
             node: spec.plan.node(chain.nodes.len()),
@@ -163,6 +173,7 @@ impl<'a> ScanController<'a> {
             Route::Planned(stops, points) => {
                 let Some(stop) = stops.pop() else { return Stage::Over };
                 self.point = stop.point.unwrap_or(*points);
+                self.average = Average::new(self.asked.len(), RowStatus::Moving);
                 Stage::Going(stop)
             }
             Route::Guided(seconds) if self.time - self.begun < *seconds => Stage::Waiting,
@@ -181,6 +192,21 @@ impl<'a> ScanController<'a> {
     fn average(&mut self, status: RowStatus) -> Stage {
         self.average = Average::new(self.asked.len(), status);
         Stage::Averaging
+    }
+
+    /// Takes a tick of a recorded press, `held` for so long (s).
+    fn record(&mut self, position: &JointVector, output: &PdOutput, held: f64) {
+        self.average.add(position, &output.torque);
+        let time = f64::from(self.average.ticks) * self.period;
+        if time >= RECORD_TIME.max(RECORD_SHARE * held) {
+            self.row = Some(self.average.row(self.point, self.time - 0.5 * (time - self.period)));
+            self.average = Average::new(self.asked.len(), self.average.status);
+        }
+    }
+
+    /// Whether it has been wherever it was to go.
+    pub fn is_done(&self) -> bool {
+        self.is_over() && !matches!(&self.route, Route::Planned(stops, _) if !stops.is_empty())
     }
 
     /// The torque of the PD control at `position`, unless a limit is exceeded; then the device is braked.
@@ -222,10 +248,35 @@ impl<'a> ScanController<'a> {
                 return Err(self.depart());
             }
             Stage::Going(stop) => {
-                if self.control.advance(&stop.q, self.period) {
-                    return Err(if stop.point.is_some() { self.settle() } else { self.depart() });
+                let speed = stop.recorded.map_or(self.spec.control.speed, |recorded| recorded.speed);
+                if self.control.advance(&stop.q, speed, self.period) {
+                    return Err(match (stop.recorded, stop.point) {
+                        (Some(recorded), _) => {
+                            self.control.rest();
+                            self.average = Average::new(self.asked.len(), RowStatus::Moving);
+                            Stage::Holding { arrived: self.time, recorded }
+                        }
+                        (None, Some(_)) => self.settle(),
+                        (None, None) => self.depart(),
+                    });
                 }
-                (Stage::Going(stop), self.control(position)?)
+                let output = self.control(position)?;
+                if stop.recorded.is_some() {
+                    self.record(position, &output, 0.0);
+                }
+                (Stage::Going(stop), output)
+            }
+            Stage::Holding { .. } if reading.held => return Err(self.depart()),
+            Stage::Holding { arrived, recorded } if self.time - arrived >= recorded.hold => return Err(self.depart()),
+            Stage::Holding { arrived, recorded } => {
+                let output = self.control(position)?;
+                // The device itself rings before that.
+                let is_held = self.time - arrived >= self.spec.control.window;
+                if is_held && self.average.status == RowStatus::Moving {
+                    self.average = Average::new(self.asked.len(), RowStatus::Held);
+                }
+                self.record(position, &output, self.time - arrived);
+                (Stage::Holding { arrived, recorded }, output)
             }
             Stage::Waiting if reading.held => return Err(Stage::Led),
             Stage::Waiting => match self.depart() {

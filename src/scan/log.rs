@@ -10,7 +10,7 @@ use crate::{
     Error, JointVector, MAX_JOINTS,
     csv::{LONGEST_LINE, Lines, Table},
     dataset::JointLabel,
-    gridize::Samples,
+    gridize::{History, Samples},
     input,
 };
 use std::{
@@ -38,11 +38,26 @@ pub enum RowStatus {
     Unsteady,
     /// A limit stopped the scan here: not gridized.
     Limit,
+    /// Part of a press that is recorded, while the device moves: not gridized.
+    Moving,
+    /// The same while it is held, and has come to rest itself.
+    Held,
 }
 
 impl RowStatus {
-    const ALL: [(Self, &'static str); 3] =
-        [(Self::Steady, "steady"), (Self::Unsteady, "unsteady"), (Self::Limit, "limit")];
+    const ALL: [(Self, &'static str); 5] = [
+        (Self::Steady, "steady"),
+        (Self::Unsteady, "unsteady"),
+        (Self::Limit, "limit"),
+        (Self::Moving, "moving"),
+        (Self::Held, "held"),
+    ];
+
+    /// Whether the row is part of a press that is recorded, of which the object's memory and friction are identified.
+    #[must_use]
+    pub fn is_recorded(self) -> bool {
+        matches!(self, Self::Moving | Self::Held)
+    }
 
     fn name(self) -> &'static str {
         Self::ALL.into_iter().find(|(status, _)| *status == self).map_or("", |(_, name)| name)
@@ -58,7 +73,7 @@ impl RowStatus {
 pub struct ScanRow {
     /// Number in the plan.
     pub point: usize,
-    /// Since the rig was started (s).
+    /// Since the rig was started, at the end of the average, or in its middle where it is recorded (s).
     pub time: f64,
     /// Measured configuration, averaged (rad or m).
     pub q: JointVector,
@@ -276,6 +291,30 @@ impl ScanLog {
             return Err(lines.error("the log ends before its first row"));
         }
         Ok(log)
+    }
+
+    /// The presses that were recorded, in the order of measurement; rows of a device that is held count.
+    #[must_use]
+    pub fn histories(&self) -> Vec<History> {
+        let mut histories: Vec<History> = Vec::new();
+        let mut last = None;
+        for row in &self.rows {
+            let press = row.status.is_recorded().then_some(row.point);
+            let Some(point) = press else {
+                last = None;
+                continue;
+            };
+            if last.replace(point) != press {
+                histories.push(History::default());
+            }
+            if let Some(history) = histories.last_mut() {
+                history.times.push(row.time);
+                history.configurations.extend_from_slice(&row.q);
+                history.torques.extend_from_slice(&row.torque);
+                history.counts.push(row.status == RowStatus::Held);
+            }
+        }
+        histories
     }
 
     /// The steady measurements, each with the standard deviation of its mean: that of a tick over the root of the

@@ -7,6 +7,7 @@
 //! [`simulated`] one, which touches no real object, and every log and dataset made with it says so; or a real one.
 
 mod controller;
+mod friction;
 mod log;
 mod pd_control;
 mod plan;
@@ -15,9 +16,10 @@ mod steady;
 mod trajectory;
 
 pub use controller::GRAVITY;
+pub use friction::{add_slip, identify_friction};
 pub use log::{LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
 pub use pd_control::{PdControl, PdOutput};
-pub use plan::{Plan, Stop};
+pub use plan::{Plan, Recorded, Stop};
 pub use steady::Steadiness;
 pub use trajectory::Trajectory;
 
@@ -67,6 +69,9 @@ pub struct ScanReport {
     pub limited: usize,
     /// Points that the joints do not reach.
     pub unreachable: usize,
+    /// Presses of which rows were recorded, earlier runs included.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub histories: Option<usize>,
     /// Time on the rig's clock in this run (s).
     pub seconds: f64,
     /// True when every point that can be reached was logged, or a hand led for the time that was asked for.
@@ -116,7 +121,7 @@ impl Session<'_> {
         let unreachable = plan.unreachable.len();
         let report = ScanReport { points: plan.points, unreachable, ..ScanReport::default() };
         let mut report = self.run((Route::Planned(stops, plan.points), 0), report, logged)?;
-        report.whole = report.logged() >= plan.points - unreachable;
+        report.whole = report.whole && report.logged() >= plan.points - unreachable;
         Ok(report)
     }
 
@@ -139,14 +144,22 @@ impl Session<'_> {
     /// Runs the scan and counts its rows in `report`.
     fn run(&mut self, route: (Route, usize), mut report: ScanReport, logged: &[ScanRow]) -> Result<ScanReport, Error> {
         (report.rig, report.simulated) = (self.header.rig.clone(), self.header.simulated);
-        logged.iter().for_each(|row| report.count(row.status));
+        let mut last_recorded = None;
+        let mut count = |report: &mut ScanReport, row: &ScanRow| {
+            if row.status.is_recorded() {
+                let is_new = last_recorded.replace(row.point) != Some(row.point);
+                *report.histories.get_or_insert(0) += usize::from(is_new);
+            }
+            report.count(row.status);
+        };
+        logged.iter().for_each(|row| count(&mut report, row));
         let (spec, chain, against_time) = (self.spec, self.chain, self.against_time);
         let controller = ScanController::new(spec, chain, route, self.stop);
         let (log, progress) = (&mut *self.log, &mut *self.progress);
         let reachable = report.points - report.unreachable;
         let mut keep = |row: ScanRow| -> Result<(), Error> {
             log.append(&row)?;
-            report.count(row.status);
+            count(&mut report, &row);
             let done = report.logged();
             progress(ScanProgress { done, points: reachable.max(done), time: row.time });
             Ok(())
@@ -175,7 +188,7 @@ impl Session<'_> {
                 .map_err(|_| rig_failed("the thread that drives the device ended unexpectedly"))?;
         } else {
             driver.run(clock, |scan, row, _| {
-                let is_measured = row.is_some();
+                let is_measured = row.as_ref().is_some_and(|row| !row.status.is_recorded());
                 row.into_iter().for_each(&mut take);
                 let is_stopped = failed.load(Ordering::Relaxed) || is_measured && stop.load(Ordering::Relaxed);
                 !scan.is_over() && !is_stopped
@@ -184,6 +197,7 @@ impl Session<'_> {
         let controller = &driver.controller;
         kept?;
         report.seconds = controller.seconds();
+        report.whole = controller.is_done();
         match controller.end() {
             None if controller.is_over() || !against_time => Ok(report),
             None if stop.load(Ordering::Relaxed) => {
@@ -234,11 +248,12 @@ fn pending(plan: &Plan, done: &HashSet<usize>) -> Vec<Stop> {
 
 impl ScanReport {
     fn count(&mut self, status: RowStatus) {
-        *match status {
-            RowStatus::Steady => &mut self.steady,
-            RowStatus::Unsteady => &mut self.unsteady,
-            RowStatus::Limit => &mut self.limited,
-        } += 1;
+        match status {
+            RowStatus::Steady => self.steady += 1,
+            RowStatus::Unsteady => self.unsteady += 1,
+            RowStatus::Limit => self.limited += 1,
+            RowStatus::Moving | RowStatus::Held => {}
+        }
     }
 
     fn logged(&self) -> usize {

@@ -15,8 +15,6 @@ const SPEED_TICKS: usize = 5;
 pub struct PdControl {
     stiffness: JointVector,
     damping: JointVector,
-    /// Greatest speed of the commanded position (rad/s or m/s).
-    speed: f64,
     commanded: JointVector,
     commanded_speed: JointVector,
     /// Positions of the last ticks, newest last.
@@ -35,10 +33,10 @@ pub struct PdOutput {
 impl PdControl {
     /// A controller that holds `position`.
     #[must_use]
-    pub fn new(stiffness: JointVector, damping: JointVector, speed: f64, position: JointVector) -> Self {
+    pub fn new(stiffness: JointVector, damping: JointVector, position: JointVector) -> Self {
         let zero = JointVector::zeros(position.len());
         let history = VecDeque::with_capacity(SPEED_TICKS + 1);
-        Self { stiffness, damping, speed, commanded: position, commanded_speed: zero, history }
+        Self { stiffness, damping, commanded: position, commanded_speed: zero, history }
     }
 
     /// Commanded position (rad or m).
@@ -47,13 +45,13 @@ impl PdControl {
         &self.commanded
     }
 
-    /// Moves the commanded position towards `target` for one `period` (s); true when it is there. All joints arrive at
-    /// the same time.
-    pub fn advance(&mut self, target: &JointVector, period: f64) -> bool {
+    /// Moves the commanded position towards `target` for one `period` (s), no joint faster than `speed` (rad/s or m/s);
+    /// true when it is there. All joints arrive at the same time.
+    pub fn advance(&mut self, target: &JointVector, speed: f64, period: f64) -> bool {
         let mut way = *target;
         way.iter_mut().zip(self.commanded.iter()).for_each(|(way, from)| *way -= from);
         let farthest = way.iter().map(|way| way.abs()).fold(0.0, f64::max);
-        let share = (self.speed * period / farthest.max(f64::MIN_POSITIVE)).min(1.0);
+        let share = (speed * period / farthest.max(f64::MIN_POSITIVE)).min(1.0);
         for joint in 0..target.len() {
             let step = share * way[joint];
             self.commanded[joint] += step;
@@ -101,16 +99,16 @@ mod tests {
 
     #[test]
     fn the_command_moves_straight_at_the_given_speed() {
-        let mut control = PdControl::new(vector([1.0; 2]), vector([0.0; 2]), 0.5, vector([0.0; 2]));
+        let mut control = PdControl::new(vector([1.0; 2]), vector([0.0; 2]), vector([0.0; 2]));
         let target = vector([0.1, -0.05]);
-        let ticks = (0..1000).position(|_| control.advance(&target, 1e-3)).unwrap();
+        let ticks = (0..1000).position(|_| control.advance(&target, 0.5, 1e-3)).unwrap();
         assert_eq!(ticks, 199);
         assert!((control.commanded()[0] - 0.1).abs() < 1e-12 && (control.commanded()[1] + 0.05).abs() < 1e-12);
     }
 
     #[test]
     fn steady_torque_is_stiffness_times_distance_and_speed_is_damped() {
-        let mut control = PdControl::new(vector([10.0, 20.0]), vector([1.0; 2]), 1.0, vector([0.0; 2]));
+        let mut control = PdControl::new(vector([10.0, 20.0]), vector([1.0; 2]), vector([0.0; 2]));
         for _ in 0..20 {
             control.torque(&vector([0.01, -0.02]), 1e-3);
         }

@@ -3,17 +3,26 @@
 //! A workspace plan goes line by line: along a line into the object, back out to the clearance, across to the next
 //! line, every other row of lines backwards so that neighbours in time are neighbours in space. A plan over joints goes
 //! through its grid row by row, every other row backwards.
+//!
+//! After some of the lines come presses that are recorded ([`crate::scene::HistorySpec`]): in to the line's last level but one, held, aside and back
+//! along both axes across, and out again.
 
 use crate::proxy::inverse_kinematics::reach;
 use crate::{
     Error, JointVector, error,
     proxy::Chain,
-    scene::{PlanSpec, WorkspacePlan},
+    scene::{PlanSpec, ScanSpec, WorkspacePlan},
 };
 use glam::DVec3;
 
+/// Where a press goes along an axis across, in strokes: to both sides and back, each way once after a turn.
+const STROKES: [f64; 4] = [1.0, -1.0, 1.0, 0.0];
+
 /// Most points of a scan: at a second a point, eleven days.
 const SCAN_POINTS: usize = 1_000_000;
+
+/// The golden ratio less one, whose multiples spread evenly however many follow.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What is wrong with a plan of which nothing can be reached.
 const NOTHING_REACHABLE: &str =
@@ -24,9 +33,20 @@ const NOTHING_REACHABLE: &str =
 pub struct Stop {
     /// Commanded configuration (rad or m).
     pub q: JointVector,
-    /// Number of the plan's point, in the order of the specification; `None` for a way point at which nothing is
-    /// measured.
+    /// Number of the plan's point, in the order of the specification, those of histories after them; `None` for a way
+    /// point at which nothing is measured.
     pub point: Option<usize>,
+    /// How it is recorded on the way and there; absent where it is measured at rest, or not at all.
+    pub recorded: Option<Recorded>,
+}
+
+/// How a stop is approached that is recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recorded {
+    /// Greatest speed of the commanded position (rad/s or m/s).
+    pub speed: f64,
+    /// Time for which it is held there (s).
+    pub hold: f64,
 }
 
 /// The stops of a scan.
@@ -34,8 +54,10 @@ pub struct Stop {
 pub struct Plan {
     /// In the order of the visit.
     pub stops: Vec<Stop>,
-    /// Number of points to be measured.
+    /// Number of points to be measured at rest.
     pub points: usize,
+    /// Number of presses to be recorded.
+    pub histories: usize,
     /// Points that the joints do not reach; they are not visited.
     pub unreachable: Vec<usize>,
 }
@@ -45,9 +67,9 @@ impl Plan {
     ///
     /// # Errors
     /// When it has too many points, or the joints reach none of them.
-    pub fn new(spec: &PlanSpec, chain: &Chain) -> Result<Self, Error> {
-        let plan = match spec {
-            PlanSpec::Workspace(plan) => workspace(plan, chain, spec.node(chain.nodes.len()))?,
+    pub fn new(spec: &ScanSpec, chain: &Chain) -> Result<Self, Error> {
+        let plan = match &spec.plan {
+            PlanSpec::Workspace(plan) => workspace(plan, spec, chain)?,
             PlanSpec::Joints(grid) => {
                 let counts: Vec<usize> = grid.axes.iter().map(|axis| axis.count).collect();
                 let points = checked_points(&counts)?;
@@ -56,8 +78,12 @@ impl Plan {
                         grid.axes.iter().zip(place).map(|(axis, k)| axis.start + *k as f64 * axis.step).collect();
                     JointVector::from_slice(&values)
                 };
-                let stop = |(point, place): (usize, Vec<usize>)| Stop { q: configuration(&place), point: Some(point) };
-                Self { stops: serpentine(&counts).map(stop).collect(), points, unreachable: Vec::new() }
+                let stop = |(point, place): (usize, Vec<usize>)| Stop {
+                    q: configuration(&place),
+                    point: Some(point),
+                    recorded: None,
+                };
+                Self { stops: serpentine(&counts).map(stop).collect(), points, histories: 0, unreachable: Vec::new() }
             }
         };
         if plan.stops.is_empty() {
@@ -72,8 +98,8 @@ impl Plan {
     /// number `first` of that order on: for each the way point that leads there, or itself, and its configuration.
     #[must_use]
     pub fn spread(&self, first: usize, count: usize) -> Vec<[JointVector; 2]> {
-        const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let measured: Vec<usize> = (0..self.stops.len()).filter(|&stop| self.stops[stop].point.is_some()).collect();
+        let is_measured = |stop: &Stop| stop.point.is_some() && stop.recorded.is_none();
+        let measured: Vec<usize> = (0..self.stops.len()).filter(|&stop| is_measured(&self.stops[stop])).collect();
         let approach = |stop: usize| self.stops[..stop].iter().rev().find(|before| before.point.is_none());
         let visit = |number: usize| {
             let place = ((number as f64 * GOLDEN).fract() * measured.len() as f64) as usize;
@@ -112,36 +138,64 @@ fn serpentine(counts: &[usize]) -> impl Iterator<Item = (usize, Vec<usize>)> {
     })
 }
 
-fn workspace(plan: &WorkspacePlan, chain: &Chain, node: usize) -> Result<Plan, Error> {
+fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Plan, Error> {
+    let node = spec.plan.node(chain.nodes.len());
     let counts = [plan.across[0].count, plan.across[1].count];
     let depth = plan.depth;
     let points = checked_points(&[counts[0], counts[1], depth.count])?;
-    let mut result = Plan { stops: Vec::new(), points, unreachable: Vec::new() };
+    let mut result = Plan { stops: Vec::new(), points, histories: 0, unreachable: Vec::new() };
+    let lines = counts[0] * counts[1];
+    let recorded = spec.history.as_ref().map_or(0, |history| ((history.share * lines as f64) as usize).max(1));
+    // The lines in the middle of so many equal parts.
+    let is_recorded = |line: usize| (line + 1) * recorded / lines > line * recorded / lines;
     let mut near = JointVector::zeros(chain.degrees_of_freedom());
     for (q, joint) in near.iter_mut().zip(&chain.joints) {
         *q = joint.limits[0].midpoint(joint.limits[1]);
     }
     for (line, place) in serpentine(&counts) {
+        let (mut bottom, mut last) = (None, None);
         let offset = |axis: usize| plan.across[axis].direction * (place[axis] as f64 * plan.across[axis].spacing);
         let top = plan.start + offset(0) + offset(1);
-        let mut visit = |position: DVec3, point: Option<usize>, stops: &mut Vec<Stop>| {
+        let mut go = |position: DVec3, point: Option<usize>, recorded: Option<Recorded>, stops: &mut Vec<Stop>| {
             let found = reach(chain, node, position, &near);
             if let Some(q) = found {
                 near = q;
-                stops.push(Stop { q, point });
+                stops.push(Stop { q, point, recorded });
             }
             found.is_some()
         };
         let back = top - depth.direction * plan.clearance;
-        visit(back, None, &mut result.stops);
+        go(back, None, None, &mut result.stops);
         for level in 0..depth.count {
             let point = line * depth.count + level;
             let position = top + depth.direction * (level as f64 * depth.spacing);
-            if !visit(position, Some(point), &mut result.stops) {
+            if go(position, Some(point), None, &mut result.stops) {
+                // Not the last level: a grid ends before the last measurement.
+                bottom = Some(last.replace(position).unwrap_or(position));
+            } else {
                 result.unreachable.push(point);
             }
         }
-        visit(back, None, &mut result.stops);
+        go(back, None, None, &mut result.stops);
+        let (Some(history), Some(bottom)) = (spec.history.as_ref().filter(|_| is_recorded(line)), bottom) else {
+            continue;
+        };
+        // The device's own viscous friction is least in slow strokes.
+        let slowest = history.speeds.iter().copied().fold(f64::INFINITY, f64::min);
+        for (press, &speed) in history.speeds.iter().enumerate() {
+            let point = Some(points + result.histories);
+            result.histories += 1;
+            let mut record = |position: DVec3, speed: f64, hold: f64| {
+                go(position, point, Some(Recorded { speed, hold }), &mut result.stops);
+            };
+            record(bottom, speed, history.hold);
+            if press == 0 && history.stroke > 0.0 {
+                for side in plan.across.iter().flat_map(|axis| STROKES.map(|share| axis.direction * share)) {
+                    record(bottom + side * history.stroke, slowest, 0.0);
+                }
+            }
+            record(back, speed, 0.0);
+        }
     }
     if result.unreachable.len() == points {
         return Err(NOTHING_REACHABLE.into());

@@ -4,8 +4,9 @@ use super::simulated::{Hand, NodeContact, SimulatedRig, Sponge};
 use super::*;
 use crate::JointVector;
 use crate::device::{Applied, Halt, Reading};
+use crate::gridize::{GridizeOptions, Past, gridize_remembering};
 use crate::proxy::inverse_kinematics::reach;
-use crate::scene::{PlanAxis, PlanSpec, ScanScene, WorkspacePlan};
+use crate::scene::{Cover, HistorySpec, PlanAxis, PlanSpec, ScanScene, WorkspacePlan};
 use glam::DVec3;
 use std::path::PathBuf;
 
@@ -39,7 +40,7 @@ struct Bench {
 impl Bench {
     fn new(scene: ScanScene) -> Self {
         let chain = Chain::new(&scene.proxy);
-        let plan = Plan::new(&scene.scan.plan, &chain).unwrap();
+        let plan = Plan::new(&scene.scan, &chain).unwrap();
         Self { chain, plan, folder: tempfile::tempdir().unwrap(), stop: AtomicBool::new(false), scene }
     }
 
@@ -279,7 +280,7 @@ fn points_out_of_reach_are_reported_and_the_rest_is_scanned() {
     let report = bench.scan().0.unwrap();
     assert_eq!(report.steady + report.unreachable, 6);
     assert!(report.whole);
-    let far = plan([1, 1, 1], DVec3::new(2.0, 0.0, 0.0));
+    let far = ScanSpec { plan: plan([1, 1, 1], DVec3::new(2.0, 0.0, 0.0)), ..bench.scene.scan.clone() };
     assert!(Plan::new(&far, &bench.chain).unwrap_err().to_string().contains("reach no point"));
 }
 
@@ -314,4 +315,63 @@ fn inverse_kinematics_reaches_what_forward_kinematics_can() {
         bench.chain.pose(&found, &mut pose);
         assert!(pose.nodes[0].distance(target) < 1e-6, "{q:?} {found:?}");
     }
+}
+
+#[test]
+fn recorded_presses_tell_how_the_block_relaxes_and_holds_back() {
+    let mut scene = scene();
+    let terms = [[0.25, 0.2], [0.15, 2.0]];
+    scene.scan.simulated.relaxation = terms.to_vec();
+    scene.scan.simulated.cover = Cover::Fabric;
+    scene.scan.simulated.joint_friction = 5e-4;
+    scene.scan.control.drift = 1e-3;
+    let axis = |direction, spacing, count| PlanAxis { direction, spacing, count };
+    scene.scan.plan = PlanSpec::Workspace(WorkspacePlan {
+        node: Some(0),
+        start: DVec3::new(0.14, -0.06, 0.012),
+        across: [axis(DVec3::Y, 0.03, 5), axis(DVec3::X, 0.02, 3)],
+        depth: axis(DVec3::NEG_Z, 0.003, 9),
+        clearance: 0.004,
+    });
+    scene.scan.history = Some(HistorySpec { share: 1.0, speeds: vec![0.5, 0.25, 0.1], hold: 10.0, stroke: 0.008 });
+    let bench = Bench::new(scene);
+    let mut log = LogWriter::create(&bench.path(), &bench.header()).unwrap();
+    let report = bench.session(&mut bench.rig(), &mut log, |session| session.scan(&bench.plan, &[])).unwrap();
+    drop(log);
+    assert_eq!((report.steady, report.histories, report.whole), (135, Some(45), true));
+    let log = ScanLog::read(&bench.path()).unwrap();
+    let histories = log.histories();
+    assert_eq!((histories.len(), log.samples().len()), (45, 135));
+    let interpolation = crate::gridize::Interpolation::Linear;
+    let options = GridizeOptions { steps: vec![0.03], epsilon: Some(0.01), interpolation, smooth: false };
+    let (mut dataset, _) = gridize_remembering(&log.samples(), (&histories, Past::Presses), &options).unwrap();
+    let found = dataset.provenance.relaxation.clone().unwrap();
+    assert_eq!(found.terms.len(), 2, "{found:?}");
+    for (found, expected) in found.terms.as_flattened().iter().zip(terms.as_flattened()) {
+        assert!((found - expected).abs() < 0.05 * expected, "{found} {expected}");
+    }
+    assert!(found.misfit < 0.01 && found.held_out.unwrap() < 0.01, "{found:?}");
+    let friction = identify_friction(&log, &bench.scene.scan, &bench.chain).unwrap();
+    assert!((friction.coefficient - 0.4).abs() < 0.05 * 0.4 && friction.deviation < 0.02, "{friction:?}");
+    assert!(friction.strokes >= 28, "{friction:?}");
+    // The limit of friction at once after a quick press is mu times the block's force before any of it fades.
+    add_slip(&mut dataset, &bench.chain, 0);
+    let norm = |point: usize| JointVector::from_slice(dataset.torque(point)).norm();
+    let greatest = (0..dataset.grid.points()).map(norm).fold(0.0, f64::max);
+    let deep: Vec<usize> = (0..dataset.grid.points()).filter(|&point| norm(point) > 0.5 * greatest).collect();
+    assert!(deep.len() > 10, "{}", deep.len());
+    let mut errors = 0.0;
+    for &point in &deep {
+        let q = dataset.grid.configuration(point);
+        let expected = bench.relaxed_torque(&q).norm() / (1.0 - 0.4);
+        errors += (friction.coefficient / 0.4 * norm(point) / expected - 1.0).powi(2);
+        let slip = dataset.slip.as_ref().unwrap();
+        assert!(slip.normal_force[point] > 0.0);
+    }
+    let error = (errors / deep.len() as f64).sqrt();
+    assert!(error < 0.1, "{error}");
+    // Nothing else of the log is taken for a measurement at rest, and a scan goes on after it.
+    let (mut log, logged) = LogWriter::resume(&bench.path(), &bench.header()).unwrap();
+    let again = bench.session(&mut bench.rig(), &mut log, |session| session.scan(&bench.plan, &logged)).unwrap();
+    assert!(again.whole && again.seconds == 0.0 && again.histories == Some(45), "{again:?}");
 }

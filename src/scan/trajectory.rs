@@ -2,10 +2,10 @@
 //!
 //! The commanded position goes from stop to stop in straight lines of C-space at the scan's speed, all joints arriving
 //! together, and rests for the dwell time where something is to be measured: a point gives two rows, arrival and
-//! departure. Such a controller does not wait until contact is steady, as `haptize scan` does: the dwell time must be
+//! departure. A press that is recorded has its own speed, and rests for as long as it is held. Such a controller does not wait until contact is steady, as `haptize scan` does: the dwell time must be
 //! long enough for the object to relax.
 
-use super::{Plan, Stop};
+use super::{Plan, Stop, plan::Recorded};
 use crate::{
     JointVector,
     csv::{Table, plain},
@@ -29,7 +29,11 @@ impl Trajectory {
     #[must_use]
     pub fn new(plan: &Plan, speed: f64, dwell: f64) -> Self {
         let mut rows: Vec<(f64, JointVector)> = Vec::new();
-        for Stop { q, point } in &plan.stops {
+        for Stop { q, point, recorded } in &plan.stops {
+            let (speed, rest) = match recorded {
+                Some(Recorded { speed, hold }) => (*speed, *hold),
+                None => (speed, if point.is_some() { dwell } else { 0.0 }),
+            };
             let (time, from) = rows.last().copied().unwrap_or((0.0, *q));
             let farthest = q.iter().zip(from.iter()).map(|(to, from)| (to - from).abs()).fold(0.0, f64::max);
             let arrival = time + farthest / speed;
@@ -37,8 +41,8 @@ impl Trajectory {
             if rows.is_empty() || arrival > time {
                 rows.push((arrival, *q));
             }
-            if point.is_some() {
-                rows.push((arrival + dwell, *q));
+            if rest > 0.0 {
+                rows.push((arrival + rest, *q));
             }
         }
         Self { rows }

@@ -18,7 +18,7 @@ const TABLES: &str = "object object.sphere object.mesh object.tetrahedra object.
     object.relaxation proxy proxy.joint.* \
     proxy.joint.*.nodes.* proxy.shape.* proxy.shape.*.cylinder proxy.shape.*.surface contact grid grid.axes.* scan \
     scan.workspace scan.workspace.across.* scan.workspace.depth scan.joints scan.joints.axes.* scan.control \
-    scan.limits scan.simulated haptics haptics.friction haptics.four_channel haptics.hand graphics.stiffening motion \
+    scan.history scan.limits scan.simulated haptics haptics.friction haptics.four_channel haptics.hand graphics.stiffening motion \
     motion.press.* motion.scrape.* device";
 
 /// Keys that earlier versions read, and what to do without them.

@@ -8,8 +8,7 @@ use super::object::ObjectTable;
 use super::proxy::ProxyTable;
 use super::scan::ScanTable;
 use super::{
-    ContactLaw, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
-    SceneError, shape,
+    DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene, SceneError, shape,
 };
 use crate::names;
 use serde::Deserialize;
@@ -56,9 +55,14 @@ pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result
         return Err(checker.error(0..0, message));
     };
     let Rendering { text, name, proxy, haptics, device, .. } = rendering(checker, &mut table)?;
-    if haptics.friction.is_some() {
-        let message = "friction needs to know how contacts slip, which a real object does not tell: leave it out";
-        return Err(checker.at("haptics.friction", message));
+    for (named, key) in
+        [(haptics.friction.is_some(), "haptics.friction"), (haptics.relaxation.is_some(), "object.relaxation")]
+    {
+        if named {
+            let message = "what a real object holds back and remembers is identified from [scan.history], not named: leave \
+                           it out";
+            return Err(checker.at(key, message));
+        }
     }
     Ok(ScanScene { text, name, scan: scan.check(checker, &proxy)?, device, proxy })
 }
@@ -73,9 +77,10 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     let proxy = table.proxy.check(checker)?;
     let joints = &proxy.joints;
     let mut object = take(&mut table.object);
+    let is_measured = table.contact.is_none() && object.as_ref().is_some_and(ObjectTable::is_measured);
     let relaxation = object.as_mut().and_then(|object| object.relaxation.take());
     let relaxation = relaxation.map(|relaxation| relaxation.check(checker)).transpose()?;
-    let object = object.map(|object| object.check(checker)).transpose()?;
+    let object = object.filter(|_| !is_measured).map(|object| object.check(checker)).transpose()?;
     // A virtual object is drawn unless the scene says no; a real one moves by no forces that are known.
     let graphics = match table.graphics {
         Some(GraphicsEntry::Loop(graphics)) => Some(graphics),
@@ -84,10 +89,9 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     };
     graphics.map_or(Ok(()), |graphics| graphics.check(checker, object.as_ref()))?;
     let mut haptics = take(&mut table.haptics);
-    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has no
-    // energy.
-    let solved = table.contact.as_ref().is_some_and(|contact| contact.law != Some(ContactLaw::Paper));
-    if !(checker.has("haptics.interpolation") || object.is_some() && solved) {
+    // What a solved dataset holds is the gradient of an energy; a measured one has an energy where it was learnt how the
+    // object relaxes.
+    if !(checker.has("haptics.interpolation") || is_measured || object.is_some() && table.contact.is_some()) {
         haptics.interpolation = Interpolation::Linear;
     }
     if relaxation.is_some() && !haptics.interpolation.is_potential() {

@@ -23,7 +23,13 @@ pub struct RelaxationSpec {
 impl RelaxationSpec {
     /// Checks it.
     pub(super) fn check(self, checker: &Checker<'_>) -> Result<Self, SceneError> {
-        let at = |message: String| Err(checker.at("object.relaxation.terms", message));
+        self.check_terms(checker, "object.relaxation.terms")?;
+        Ok(self)
+    }
+
+    /// Checks its terms, which stand at `key`.
+    pub(super) fn check_terms(&self, checker: &Checker<'_>, key: &str) -> Result<(), SceneError> {
+        let at = |message: String| Err(checker.at(key, message));
         if self.terms.is_empty() || self.terms.len() > MOST_TERMS {
             return at(format!("terms lists {} terms: it must list 1 to {MOST_TERMS}", self.terms.len()));
         }
@@ -39,6 +45,6 @@ impl RelaxationSpec {
                 "the shares of terms sum to {sum:.3}: their sum must be less than 1, or a dent would never recover"
             ));
         }
-        Ok(self)
+        Ok(())
     }
 }

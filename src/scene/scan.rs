@@ -6,13 +6,16 @@ use super::grid::GridTable;
 use super::value::{
     KEY, Range, count, defaults, direction, edges, gains, not_negative, positive, positive_gains, vector,
 };
-use super::{GridSpec, JointKind, ProxySpec, SceneError};
+use super::{GridSpec, JointKind, ProxySpec, RelaxationSpec, SceneError};
 use crate::JointVector;
 use glam::DVec3;
 use serde::de::{Deserialize, Deserializer, Error};
 
 /// Most positions along one axis of a plan.
 const MOST: usize = 100_000;
+
+/// Most speeds of recorded presses.
+const MOST_SPEEDS: usize = 8;
 
 /// Haptization of a real object.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +24,8 @@ pub struct ScanSpec {
     pub plan: PlanSpec,
     /// How it is driven there, and when a measurement counts.
     pub control: ScanControl,
+    /// What is recorded beside, of how the object remembers and holds back; absent where the scene does not name it.
+    pub history: Option<HistorySpec>,
     /// Limits that stop it.
     pub limits: ScanLimits,
     /// The specimen that is simulated in place of a real one.
@@ -135,6 +140,31 @@ impl Default for ScanControl {
     }
 }
 
+/// Presses that are recorded from the first touch on, at some lines of a [`WorkspacePlan`]: to the end of the line at
+/// each of the speeds, held there, moved aside to and fro, and back out.
+#[derive(Clone, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HistorySpec {
+    /// Share of the plan's lines, at least one (1).
+    #[serde(deserialize_with = "share_of_lines")]
+    pub share: f64,
+    /// Speed of the commanded position in each press (rad/s or m/s).
+    #[serde(deserialize_with = "speeds")]
+    pub speeds: Vec<f64>,
+    /// How long each is held (s).
+    #[serde(deserialize_with = "positive")]
+    pub hold: f64,
+    /// How far the node goes to either side in the first press, along both axes across; zero: nowhere (m).
+    #[serde(deserialize_with = "not_negative")]
+    pub stroke: f64,
+}
+
+impl Default for HistorySpec {
+    fn default() -> Self {
+        Self { share: 0.05, speeds: vec![1.0, 0.1], hold: 10.0, stroke: 0.0 }
+    }
+}
+
 /// Limits that stop a scan at once.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -151,7 +181,7 @@ pub struct ScanLimits {
 }
 
 /// A simulated spongy block, mounted so that it does not move.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpecimenSpec {
     /// Corner with the least coordinates (m).
@@ -163,6 +193,9 @@ pub struct SpecimenSpec {
     /// Layer on its surface.
     #[serde(default)]
     pub cover: Cover,
+    /// Share of the force after a step that fades, and the time in which it does (1, s).
+    #[serde(default = "foam")]
+    pub relaxation: Vec<[f64; 2]>,
     /// Coefficient of friction between proxy and surface (1).
     #[serde(deserialize_with = "not_negative", default = "friction")]
     pub friction: f64,
@@ -196,6 +229,7 @@ pub(super) struct ScanTable {
     joints: Option<GridTable>,
     #[serde(default)]
     control: ScanControl,
+    history: Option<HistorySpec>,
     limits: ScanLimits,
     simulated: SpecimenSpec,
 }
@@ -203,7 +237,7 @@ pub(super) struct ScanTable {
 impl ScanTable {
     /// The scan for the arm `proxy`.
     pub fn check(self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<ScanSpec, SceneError> {
-        let Self { workspace, joints, mut control, mut limits, simulated } = self;
+        let Self { workspace, joints, mut control, history, mut limits, simulated } = self;
         let plan = match (workspace, joints) {
             (Some(plan), None) => {
                 checker.node("scan.workspace.node", plan.node, proxy)?;
@@ -221,12 +255,38 @@ impl ScanTable {
             let message = "window must hold at least four ticks of the control rate";
             return Err(checker.at("scan.control.window", message));
         }
-        Ok(ScanSpec { plan, control, limits, simulated })
+        if history.is_some() && matches!(plan, PlanSpec::Joints(_)) {
+            let message =
+                "history presses along the lines of [scan.workspace], which [scan.joints] has not: leave it out";
+            return Err(checker.at("scan.history", message));
+        }
+        let relaxation = RelaxationSpec { terms: simulated.relaxation.clone(), dent: None };
+        if !relaxation.terms.is_empty() {
+            relaxation.check_terms(checker, "scan.simulated.relaxation")?;
+        }
+        Ok(ScanSpec { plan, control, history, limits, simulated })
     }
 }
 
 fn control_rate<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
     Range::Between(1.0, 1e5).number(value)
+}
+
+fn share_of_lines<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    Range::Within(0.0, 1.0).number(value)
+}
+
+fn speeds<'de, D: Deserializer<'de>>(value: D) -> Result<Vec<f64>, D::Error> {
+    let speeds = Range::Positive.list(value)?;
+    if (1..=MOST_SPEEDS).contains(&speeds.len()) {
+        return Ok(speeds);
+    }
+    Err(D::Error::custom(format!("{KEY}has {} speeds: it needs 1 to {MOST_SPEEDS}", speeds.len())))
+}
+
+/// Two terms of an overstress of 0.25 and 0.12 times the lasting force.
+fn foam() -> Vec<[f64; 2]> {
+    vec![[0.25 / 1.37, 0.03], [0.12 / 1.37, 0.25]]
 }
 
 fn two_axes<'de, D: Deserializer<'de>>(value: D) -> Result<[PlanAxis; 2], D::Error> {

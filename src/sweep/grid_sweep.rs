@@ -147,6 +147,8 @@ impl<'a> Sweep<'a> {
                 notices: Vec::new(),
                 error: None,
                 mesh_ripple: None,
+                relaxation: None,
+                friction: None,
                 aim: None,
             },
             skin: object.skin,

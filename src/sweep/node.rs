@@ -18,11 +18,10 @@
 
 use super::table::PointResult;
 use crate::{
-    Error, JointVector,
+    JointVector,
     contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
     field::{GRADIENT_STEP, LEAST_ENERGY},
     joint_matrix,
-    scene::{ContactLaw, Scene},
     store::{
         Space,
         record::{mixed, slip_of, slope, width},
@@ -44,21 +43,6 @@ const FARTHEST: f64 = 2.0;
 
 /// Most Newton steps to the boundary: the gap is nearly linear, and each step squares the error.
 const STEPS: usize = 6;
-
-/// Checks that nodes can be solved of `scene`.
-///
-/// # Errors
-/// When its law is [`ContactLaw::Paper`], which gives no energy with a tangent.
-pub fn check_law(scene: &Scene) -> Result<(), Error> {
-    if scene.contact.law == ContactLaw::Paper {
-        return Err(
-            "the scene's law of contact is \"paper\", and nodes that refine a grid need the energy of contact with its \
-             tangent: leave law out of [contact], or bake the grid alone"
-                .into(),
-        );
-    }
-    Ok(())
-}
 
 /// A solved node.
 pub(super) struct Solved {

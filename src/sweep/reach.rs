@@ -10,7 +10,7 @@ use crate::{
     Error, ErrorKind, JointVector,
     contact::{Model, NodeTree},
     error,
-    object::Object,
+    object::{Object, corners},
     proxy::Chain,
     random::Random,
     scene::{AxisSpec, Scene},
@@ -128,7 +128,7 @@ impl Reach {
         // No compliance is needed where nothing is solved.
         let model = Model::reaching(&object, &chain, scene.contact, &[])?;
         let (tree, body) = (NodeTree::new(&chain), size(&object));
-        let shallow = depth.unwrap_or(SHALLOW * body);
+        let shallow = depth.unwrap_or_else(|| self::shallow(&object));
         let is_shallow = |met: &Met| met.gap < 0.0 && -met.gap <= shallow;
         let mut random = Random::new(SEED);
         let mut met: Vec<Met> = Vec::new();
@@ -233,9 +233,13 @@ impl Reach {
 
 /// Least extent of the object's surface along an axis of space (m).
 fn size(object: &Object) -> f64 {
-    let nodes = &object.rest[..object.surface_nodes];
-    let bounds = nodes.iter().map(|node| (*node, *node)).reduce(|(low, high), (a, b)| (low.min(a), high.max(b)));
-    bounds.map_or(0.0, |(low, high)| (high - low).min_element())
+    let [low, high] = corners(&object.rest[..object.surface_nodes]);
+    (high - low).min_element()
+}
+
+/// Depth up to which contact with `object` counts as shallow (m).
+pub(crate) fn shallow(object: &Object) -> f64 {
+    SHALLOW * size(object)
 }
 
 /// A round of random configurations within the joint limits.

@@ -7,7 +7,7 @@ use crate::{
     dataset::{FrictionExcess, InterpolationError, MeasuredError},
     error,
     random::Random,
-    scene::{ContactLaw, ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
+    scene::{ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
 };
 
 /// Relative residual to which the reference of an accuracy study is solved (1): three decades below the scenes' own
@@ -226,11 +226,10 @@ fn excess(model: &Model<'_>, q: &JointVector, (here, slip): (&Equilibrium, &Slip
     (exact > 0.0).then(|| slip.dissipation(&rates) / exact - 1.0)
 }
 
-/// `contact` with the geometry that it has, the energy form's where it is the paper's, solved to `tolerance`.
+/// `contact` solved to `tolerance`.
 pub(super) fn tight(contact: ContactSpec, tolerance: f64) -> ContactSpec {
     let max_iterations = contact.max_iterations.saturating_mul(10);
-    let law = if contact.law == ContactLaw::Paper { ContactLaw::Following } else { contact.law };
-    ContactSpec { law, tolerance, max_iterations, ..contact }
+    ContactSpec { tolerance, max_iterations, ..contact }
 }
 
 /// `places` solved as `contact` says, on all cores.

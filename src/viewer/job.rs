@@ -16,7 +16,7 @@ use crate::{
 };
 use std::{
     fmt,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -213,7 +213,7 @@ fn run(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Loaded, Option<Body>), Error> {
     let loaded = match task {
-        Task::Open(path) if is_scene(&path) => Loaded::live(Scene::load(&path)?)?,
+        Task::Open(path) if Scene::is_at(&path) => Loaded::live(Scene::load(&path)?)?,
         Task::Open(path) => {
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
@@ -222,11 +222,6 @@ fn run(
     };
     let body = Body::new(context, &loaded, &loaded.tuning().graphics)?;
     Ok((loaded, body))
-}
-
-/// Scenes end in .toml; everything else is taken for a dataset, whose reader says what it is not.
-fn is_scene(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
 fn bake(
@@ -276,7 +271,7 @@ fn bake(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{object::Object, scene::Shape};
+    use crate::{object::Object, scene::Placement, scene::Shape};
 
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
@@ -298,8 +293,8 @@ mod tests {
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let mut scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let surface = Surface::of(&Object::build(&scene.object).unwrap());
-        let (file, centre) = ("gone.obj".into(), glam::DVec3::ZERO);
-        scene.object.shape = Shape::Mesh { file, scale: 1.0, centre, refine: None };
+        let file = "gone.obj".into();
+        scene.object.shape = Shape::Mesh { file, placement: Placement::METRES, refine: None };
         scene.grid.axes.iter_mut().for_each(|axis| axis.count = 2);
         let bake = |surface| {
             let task = Task::Bake(Arc::new(scene.clone()), surface);

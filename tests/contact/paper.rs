@@ -3,12 +3,12 @@ use haptize::{
     dataset::Dataset,
     device::Motion,
     gridize::{GridizeOptions, Interpolation, gridize},
+    paper::{Comparison, Row, Scanned, Scans, Sphere, Value, baked, procedure, specimen},
     proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
-    report::paper::{Comparison, Row, Scanned, Scans, Sphere, Value, procedure, specimen},
     scan::{LogHeader, LogWriter, Plan, ScanLog, Session, labels, simulated::SimulatedRig},
-    scene::{ContactLaw, PlanSpec, ScanScene, Scene, Waypoint},
-    sweep::{SweepReport, baked},
+    scene::{PlanSpec, ScanScene, Scene, Waypoint},
+    sweep::SweepReport,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -28,9 +28,9 @@ fn felt(dataset: &Dataset, motion: impl Fn(&Setup) -> &[Waypoint]) -> (Setup, Tr
 #[test]
 fn the_papers_iteration_converges_for_95_percent_of_the_contacts_and_the_press_meets_no_failure() {
     let mut scene = paper();
-    assert_eq!(scene.contact.law, ContactLaw::Paper);
     let share = |report: &SweepReport| 1.0 - report.unconverged as f64 / report.contact_points as f64;
     let (dataset, report) = baked(&scene).unwrap();
+    assert_eq!(dataset.provenance.algorithm, "paper");
     assert!(report.contact_points > 4000 && share(&report) >= 0.95, "{report:?}");
 
     for (name, several) in [("press", 5), ("scrape", 3)] {
@@ -63,7 +63,7 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     let PlanSpec::Workspace(plan) = &mut part.scan.plan else { unreachable!() };
     (plan.start.y, plan.across[0].count, plan.across[1].count) = (-0.012, 5, 8);
     let chain = Chain::new(&part.proxy);
-    let plan = Plan::new(&part.scan.plan, &chain).unwrap();
+    let plan = Plan::new(&part.scan, &chain).unwrap();
     let mut rig = SimulatedRig::new(&part.proxy, &part.scan.simulated, plan.stops[0].q, 1);
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("log.csv");

@@ -374,7 +374,7 @@ fn a_session_is_recorded_as_mcap_and_gridized_again() {
 fn a_plan_goes_out_as_a_trajectory_that_rests_at_every_point() {
     let scene = ScanScene::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets/sponge.toml")).unwrap();
     let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain).unwrap();
+    let plan = Plan::new(&scene.scan, &chain).unwrap();
     let trajectory = Trajectory::new(&plan, 0.3, 0.25);
     for pair in trajectory.rows.windows(2) {
         let ((before, from), (after, to)) = (pair[0], pair[1]);

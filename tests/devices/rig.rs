@@ -86,7 +86,7 @@ fn scan(scene: &ScanScene, most: f64, scripts: &[Script]) -> (Result<(), Error>,
 
 fn scan_by(thread: Thread, scene: &ScanScene, most: f64, scripts: &[Script]) -> (Result<(), Error>, Vec<ScanRow>) {
     let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain).unwrap();
+    let plan = Plan::new(&scene.scan, &chain).unwrap();
     let first = plan.stops[0].q;
     let rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, first, 7);
     let limits = Limits { effort: all(3, most), watchdog: Watchdog::None };

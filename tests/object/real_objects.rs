@@ -30,7 +30,7 @@ fn haptized(name: &str, part: impl FnOnce(&mut WorkspacePlan)) -> Dataset {
     let PlanSpec::Workspace(plan) = &mut scene.scan.plan else { unreachable!() };
     part(plan);
     let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan.plan, &chain).unwrap();
+    let plan = Plan::new(&scene.scan, &chain).unwrap();
     let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, plan.stops[0].q, SEED);
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("log.csv");
@@ -129,7 +129,7 @@ fn a_real_instrument_is_predicted_about_as_well_as_it_repeats_itself() {
     };
     let mapping = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("datasets/instrument.toml");
     let mut mapping = Mapping::load(&mapping).unwrap();
-    let Imported { samples, branches, report } = import(&mapping, &logs, &mut |_| {}).unwrap();
+    let Imported { samples, branches, report, .. } = import(&mapping, &logs, &mut |_| {}).unwrap();
     let cells = report.cells.unwrap();
     assert!(report.rows > 190_000 && samples.len() > 500, "{} rows, {} samples", report.rows, samples.len());
     // Friction: the torque on the way up is lower than on the way down, by far more than repeating a pass changes it.

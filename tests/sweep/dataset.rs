@@ -64,6 +64,13 @@ fn sample() -> Dataset {
             date: "2012-03-04T00:00:00Z".into(),
             error: None,
             mesh_ripple: None,
+            relaxation: Some(haptize::dataset::IdentifiedRelaxation {
+                terms: vec![[0.4, 0.05], [0.2, 0.5]],
+                histories: 12,
+                misfit: 0.01,
+                held_out: Some(0.02),
+            }),
+            friction: Some(haptize::dataset::IdentifiedFriction { coefficient: 0.4, strokes: 6, deviation: 0.02 }),
             aim: None,
         },
     }

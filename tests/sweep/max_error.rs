@@ -292,15 +292,3 @@ fn a_scene_is_refined_for_potential_whatever_its_interpolation() {
     let [linear, potential] = ["linear", "potential"].map(refined);
     assert_eq!(linear, potential);
 }
-
-#[test]
-fn what_no_refined_bake_can_do_is_refused_before_anything_is_written() {
-    let folder = Folder::new();
-    let path = folder.0.path();
-    std::fs::write(path.join("a.toml"), SCENE).unwrap();
-    std::fs::write(path.join("paper.toml"), SCENE.replace("[contact]\n", "[contact]\nlaw = \"paper\"\n")).unwrap();
-    let output = haptize(path, &["bake", "paper.toml", "--max-error", "5%", "--refine", "2"]);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.code() == Some(1) && told.contains("leave law out"), "{told}");
-    assert_eq!(folder.names(), ["a.toml", "paper.toml"]);
-}

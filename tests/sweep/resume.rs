@@ -84,9 +84,9 @@ fn a_part_of_another_sweep_is_refused_with_the_difference() {
     let other = Object::build(&changed("stiffness = 300.0", "stiffness = 300.1").object).unwrap();
     let elsewhere = Sweep::new(&scene(), &other, "cpu", "none", date).unwrap();
     assert_eq!(refused(&elsewhere), "another object, such as a mesh that changed meanwhile");
-    let mut paper = scene();
-    paper.contact.law = haptize::scene::ContactLaw::Paper;
-    assert_eq!(refused(&sweep_of(&paper, "none", date)), "another algorithm");
+    let mut following = scene();
+    following.contact.law = haptize::scene::ContactLaw::Following;
+    assert_eq!(refused(&sweep_of(&following, "none", date)), "another algorithm");
     // A refusal changes nothing.
     assert_eq!(
         bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 9, usize::MAX).unwrap().resumed_points,

@@ -53,7 +53,7 @@ impl SimulatedRig {
         let chain = Chain::new(proxy);
         let mut rig = Self {
             sponge: Sponge::new(spec),
-            spec: *spec,
+            spec: spec.clone(),
             gravity: DVec3::new(0.0, 0.0, -crate::scan::GRAVITY),
             contacts: vec![NodeContact::default(); chain.nodes.len()],
             pose: chain.new_pose(),
@@ -163,7 +163,7 @@ impl SimulatedRig {
     /// Returns a description for logs, one line.
     #[must_use]
     pub fn description(&self) -> String {
-        let SpecimenSpec { size, cover, .. } = self.spec;
+        let SpecimenSpec { size, cover, .. } = &self.spec;
         let cover = match cover {
             Cover::Bare => "bare",
             Cover::Fabric => "covered with fabric",

@@ -9,8 +9,8 @@
 //! tension S held at distance R: `F = 2 pi S d / ln(R / r)`: small for foam alone, large for a fabric. That is what
 //! makes the cover stiffer.
 //!
-//! **Viscous.** Overstress relaxes: two Maxwell branches, `dq_k/dt = g_k dFe/dt - q_k / theta_k` (quasi-linear
-//! viscoelasticity, Fung 1981). A node that retracts faster than the foam recovers loses contact: force is never
+//! **Viscous.** Overstress relaxes: a Maxwell branch for each term of the specimen, `dq_k/dt = G_k dFe/dt - q_k / theta_k`
+//! (quasi-linear viscoelasticity, Fung 1981), G_k the term's share over that of the force that lasts. A node that retracts faster than the foam recovers loses contact: force is never
 //! negative.
 //!
 //! **Friction.** Where a node first touches a face it sticks; the tangential spring slides at mu times the normal
@@ -19,7 +19,7 @@
 //! A node presses the face through which it came in until it leaves the block, however deep it goes: distance to
 //! the nearest face would let it slip out sideways.
 
-use crate::scene::{Cover, SpecimenSpec};
+use crate::scene::{Cover, MOST_TERMS, SpecimenSpec};
 use glam::DVec3;
 
 /// Young's modulus of the foam at small strain (Pa).
@@ -34,10 +34,6 @@ const GREATEST_STRAIN: f64 = 0.9;
 const TENSION: [f64; 2] = [4.0, 22.0];
 /// Where the sheet is held, from the node (m).
 const SHEET_RADIUS: f64 = 0.05;
-/// Strength of the Maxwell branches (1).
-const BRANCHES: [f64; 2] = [0.25, 0.12];
-/// Their relaxation times (s).
-const RELAXATION: [f64; 2] = [0.03, 0.25];
 /// Tangential stiffness while a node sticks (N/m).
 const STICKING: f64 = 300.0;
 /// Rings over which the pressure under a node is summed, and points on each.
@@ -53,6 +49,8 @@ pub struct Sponge {
     size: DVec3,
     tension: f64,
     friction: f64,
+    /// Strength of each Maxwell branch over the force that lasts, and its time (1, s).
+    branches: Vec<[f64; 2]>,
 }
 
 /// One node's contact, from step to step.
@@ -60,7 +58,7 @@ pub struct Sponge {
 pub struct NodeContact {
     face: Option<Face>,
     /// Overstress of each branch (N).
-    overstress: [f64; BRANCHES.len()],
+    overstress: [f64; MOST_TERMS],
     /// Elastic force at the last step (N).
     elastic: f64,
     /// Tangential stretch of the sticking spring (m).
@@ -99,7 +97,9 @@ impl Sponge {
     #[must_use]
     pub fn new(spec: &SpecimenSpec) -> Self {
         let tension = TENSION[usize::from(spec.cover == Cover::Fabric)];
-        Self { corner: spec.corner, size: spec.size, tension, friction: spec.friction }
+        let lasting = 1.0 - spec.relaxation.iter().map(|[share, _]| share).sum::<f64>();
+        let branches = spec.relaxation.iter().map(|[share, time]| [share / lasting, *time]).collect();
+        Self { corner: spec.corner, size: spec.size, tension, friction: spec.friction, branches }
     }
 
     /// Force on a node of `radius` at `position`, `time` (s) after the last step; `contact` is its history.
@@ -117,7 +117,7 @@ impl Sponge {
         contact.face = Some(face);
         let elastic = self.elastic(face, position, radius, depth);
         let mut normal_force = elastic;
-        for ((q, strength), theta) in contact.overstress.iter_mut().zip(BRANCHES).zip(RELAXATION) {
+        for (q, [strength, theta]) in contact.overstress.iter_mut().zip(&self.branches) {
             // Backward Euler: stable for any step.
             *q = (*q + strength * (elastic - contact.elastic)) / (1.0 + time / theta);
             normal_force += *q;
@@ -206,6 +206,7 @@ mod tests {
             corner: DVec3::ZERO,
             size: DVec3::new(0.18, 0.08, 0.05),
             cover,
+            relaxation: vec![[0.2, 0.03], [0.1, 0.25]],
             friction: 0.4,
             encoder: 0.0,
             noise: 0.0,

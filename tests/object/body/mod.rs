@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use haptize::fixtures::Random;
 use haptize::object::{Compliance, Object};
 use haptize::scene::{
-    GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Scene, Shape, SpringKind, SpringSpec,
+    GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Placement, Scene, Shape, SpringKind, SpringSpec,
 };
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,11 @@ fn sphere_spec(kind: SpringKind, nodes: GroundNodes) -> ObjectSpec {
 }
 
 fn mesh_spec(file: impl Into<PathBuf>) -> ObjectSpec {
-    let shape = Shape::Mesh { file: file.into(), scale: 0.5, centre: CENTRE, refine: None };
+    let shape = Shape::Mesh {
+        file: file.into(),
+        placement: Placement { scale: 0.5, centre: CENTRE, ..Placement::METRES },
+        refine: None,
+    };
     ObjectSpec { shape, ..sphere_spec(SpringKind::Isotropic, GroundNodes::All) }
 }
 
@@ -361,7 +365,11 @@ fn refinement_brings_a_sphere_near_and_refuses_what_it_cannot_refine() {
     let faces = sphere.triangles.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
     std::fs::write(&file, vertices.chain(faces).collect::<String>()).unwrap();
     let refined = |edge: f64| {
-        let shape = Shape::Mesh { file: file.clone(), scale: 1.0, centre: CENTRE, refine: Some(edge) };
+        let shape = Shape::Mesh {
+            file: file.clone(),
+            placement: Placement { centre: CENTRE, ..Placement::METRES },
+            refine: Some(edge),
+        };
         Object::build(&ObjectSpec { shape, ..spec.clone() })
     };
     let finer = refined(0.005).unwrap();

@@ -13,15 +13,15 @@ use haptize::{
 fn a_look_up_allocates_nothing() {
     for joints in [2, 3, 5] {
         let store = store(joints, 3, 0.6, 1, noise(joints, 1));
-        let mut finest = 0;
+        let mut found = 0;
         for k in 0..1000 {
             let mut q = [0.0; 5];
             q.iter_mut().enumerate().for_each(|(a, q)| *q = 0.25 * (0.3 * f64::from(k) + a as f64).sin());
             let (sample, held) = peak(|| store.sample(&q[..joints]));
             assert_eq!(held, 0, "bytes");
-            finest = finest.max(sample.levels);
+            found += u32::from(!sample.absent);
         }
-        assert!(finest > 1, "{finest}");
+        assert!(found > 100, "{found}");
     }
 }
 

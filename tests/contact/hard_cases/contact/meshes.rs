@@ -10,7 +10,7 @@ use haptize::{
     contact::{Model, Solver, Status},
     object::Object,
     proxy::Chain,
-    scene::{JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape},
+    scene::{JointKind, ObjectSpec, Placement, ProxyNodeSpec, ProxySpec, Shape},
 };
 use std::{fmt::Write, path::Path};
 
@@ -102,7 +102,7 @@ fn build(folder: &Path, (nodes, triangles): &Surface) -> Result<Object, Failure>
     }
     let file = folder.join("surface.obj");
     std::fs::write(&file, text)?;
-    let shape = Shape::Mesh { file, scale: 1.0, centre: DVec3::ZERO, refine: None };
+    let shape = Shape::Mesh { file, placement: Placement::METRES, refine: None };
     Ok(Object::build(&ObjectSpec { shape, ..sphere_spec(PAPER, DVec3::ZERO, 1.0, 1.0) })?)
 }
 

@@ -55,7 +55,7 @@ fn caption(what: &str, scanned: Scanned<'_>) -> String {
 
 /// The block, the arm where it pushes hardest, and where the visiting node was measured.
 fn picture(scanned: Scanned<'_>) -> Picture {
-    let block = scanned.scene.scan.simulated;
+    let block = &scanned.scene.scan.simulated;
     let chain = scanned.chain;
     let mut pose = chain.new_pose();
     let node = scanned.scene.scan.plan.node(chain.nodes.len());
