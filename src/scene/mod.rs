@@ -34,7 +34,6 @@ pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
 pub use error::{Diagnostic, SceneError};
 pub(crate) use file::LINEAR_RELAXATION;
-pub use gains::GainError;
 pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};
 pub use grid::{AxisSpec, GRID_LINE, GRID_STEP_SLACK, GridSpec};
 pub use haptics::{
