@@ -11,7 +11,7 @@ use crate::{
     Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
-        GridizeOptions, GridizeReport, History, Interpolation, Past, Samples, gridize, gridize_remembering,
+        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Samples, gridize, gridize_remembering,
         predict_histories,
         prediction::{Prediction, held_out, predict},
     },
@@ -102,7 +102,7 @@ pub struct Source {
     branches: Option<([Samples; 2], usize)>,
     left_out: usize,
     /// What tells how the object relaxes, where something does.
-    past: Option<(Vec<History>, Past)>,
+    past: Option<(Vec<ForceHistory>, Past)>,
     /// Friction of the object, and the arm and its node that felt it.
     friction: Option<(IdentifiedFriction, Chain, usize)>,
 }
