@@ -43,7 +43,7 @@ fn live(py: Python<'_>, scene: &Bound<'_, Scene>) -> PyResult<(Setup, dataset::D
     let built = background::run(py, &AtomicBool::new(false), build, |()| Ok(()))?;
     let scene = Arc::new(built.map_err(|error| errors::bake(&error))?);
     let (dataset, notice) = (scene.dataset(), scene.notice());
-    let setup = threads::detach(py, || Setup::live(scene, &dataset))?.map_err(|error| errors::setup(py, &error))?;
+    let setup = threads::detach(py, || Setup::live(scene, &dataset))?.map_err(|error| errors::dataset(py, &error))?;
     Ok((setup, dataset, notice))
 }
 
@@ -61,7 +61,7 @@ impl Loop {
             notice = None;
             let dataset = &source.cast::<Dataset>()?.get().dataset;
             let setup = threads::detach(py, || Setup::new(dataset))?;
-            (setup.map_err(|error| errors::setup(py, &error))?, dataset)
+            (setup.map_err(|error| errors::dataset(py, &error))?, dataset)
         };
         let (haptics, advice) = match gains {
             None => (setup.haptics, setup.advice),
@@ -73,7 +73,7 @@ impl Loop {
                     spec.set_gain(&key, &values).map_err(|error| PyValueError::new_err(error.to_string()))?;
                 }
                 let retuned = threads::detach(py, || setup.retuned(dataset, &spec))?;
-                let retuned = retuned.map_err(|error| errors::setup(py, &error))?;
+                let retuned = retuned.map_err(|error| errors::dataset(py, &error))?;
                 (Arc::new(retuned.0), retuned.1)
             }
         };

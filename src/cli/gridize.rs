@@ -8,8 +8,7 @@ use super::{
     watch,
 };
 use crate::{
-    MAX_JOINTS,
-    csv::TableError,
+    Error, MAX_JOINTS,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
         GridizeOptions, GridizeReport, History, Interpolation, Past, Samples, gridize, gridize_remembering,
@@ -296,8 +295,7 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
     let Some(log) = arguments.logs.first().filter(|log| is_mcap(log)) else {
         // A recording of another kind says what to do.
         for log in &arguments.logs {
-            let unreadable = |source| TableError::Read { file: log.clone(), source };
-            input::open(log).map_err(unreadable)?;
+            input::open(log).map_err(|source| Error::unreadable(log, &source))?;
         }
         return if topic.is_some() {
             Err("--topic is of MCAP files, and the first log is none".into())

@@ -1,5 +1,6 @@
 //! Why the GPU could not do it.
 
+use crate::{Error, memory};
 use std::time::Duration;
 
 /// Why the GPU could not do it.
@@ -85,5 +86,11 @@ impl From<wgpu::Error> for GpuError {
                 Self::Refused(description)
             }
         }
+    }
+}
+
+impl From<GpuError> for Error {
+    fn from(error: GpuError) -> Self {
+        Self::new(format!("{error}{}", memory::scarcity()))
     }
 }

@@ -8,11 +8,8 @@
 //! with (d + 1) / k for the noise of the plane itself, k neighbours. Exact measurements stay as they are, linear
 //! torques too, and edges keep their height.
 
-use super::{
-    GridizeError,
-    cloud::{Cloud, Position},
-};
-use crate::MAX_JOINTS;
+use super::cloud::{Cloud, Position};
+use crate::{Error, MAX_JOINTS};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -71,9 +68,9 @@ impl Cells {
 }
 
 /// Smooths the torques of `cloud`.
-pub(super) fn smooth(cloud: &mut Cloud) -> Result<(), GridizeError> {
+pub(super) fn smooth(cloud: &mut Cloud) -> Result<(), Error> {
     if cloud.variances.is_empty() {
-        return Err(GridizeError::NoDeviations);
+        return Err("smoothing needs the standard deviation of the samples, and none was measured: leave it out".into());
     }
     let joints = cloud.joints;
     let wanted = NEIGHBOURS_A_COEFFICIENT * (joints + 1);

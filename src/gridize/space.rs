@@ -2,18 +2,17 @@
 
 use super::cloud::JITTER;
 use super::{
-    GridizeError,
     cloud::{Cloud, Position},
     interpolant::{Simplex, Triangulation},
     tetrahedra::Tetrahedra,
 };
-use crate::MAX_JOINTS;
+use crate::{Error, MAX_JOINTS};
 
 /// Tetrahedra of the jittered points of a cloud.
 pub(super) struct Space(Tetrahedra);
 
 impl Space {
-    pub fn new(cloud: &Cloud) -> Result<Self, GridizeError> {
+    pub fn new(cloud: &Cloud) -> Result<Self, Error> {
         Tetrahedra::new(cloud.jittered(JITTER), &cloud.spanning).map(Self)
     }
 }

@@ -1,6 +1,7 @@
 //! A body from a mesh file as the table of a scene, for a start: an elastic solid under a skin, lying on the ground.
 
-use super::{ObjectError, import, topology};
+use super::{import, topology};
+use crate::Error;
 use crate::scene::Placement;
 use crate::toml_text::{coarse, entry, number, vector};
 use glam::DVec3;
@@ -69,13 +70,7 @@ impl Draft {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn new(
-        file: &Path,
-        name: &str,
-        unit: Option<LengthUnit>,
-        turn: DVec3,
-        young: f64,
-    ) -> Result<Self, ObjectError> {
+    pub fn new(file: &Path, name: &str, unit: Option<LengthUnit>, turn: DVec3, young: f64) -> Result<Self, Error> {
         let (nodes, triangles) = import::read(file, &Placement::METRES, &mut Vec::new())?;
         let unit = unit.unwrap_or(if import::length(&nodes) > LONGEST { LengthUnit::Mm } else { LengthUnit::M });
         let scale = unit.metres();

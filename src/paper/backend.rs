@@ -2,7 +2,7 @@
 
 use super::iteration::PaperIteration;
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{
         Backend, Equilibrium, MINIMUM_SQUARE, Model, Status, Touch, detection::Detection, linear::support::dot, reach,
         reactions::Reactions,
@@ -10,7 +10,7 @@ use crate::{
     dataset::Dataset,
     proxy::{Chain, Pose},
     scene::Scene,
-    sweep::{BackendChoice, Bake, BakeError, CpuBackend, Run, Sweep, SweepReport, build_object, sample},
+    sweep::{BackendChoice, Bake, CpuBackend, Run, Sweep, SweepReport, build_object, sample},
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -139,7 +139,7 @@ impl Backend for PaperBackend<'_> {
 ///
 /// # Errors
 /// As [`Bake::in_memory`].
-pub fn haptize(bake: Bake<'_>) -> Result<(Dataset, SweepReport), BakeError> {
+pub fn haptize(bake: Bake<'_>) -> Result<(Dataset, SweepReport), Error> {
     let Bake { scene, measured, date, stop, progress, .. } = bake;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
@@ -159,7 +159,7 @@ pub fn haptize(bake: Bake<'_>) -> Result<(Dataset, SweepReport), BakeError> {
 ///
 /// # Errors
 /// As [`haptize`].
-pub fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), BakeError> {
+pub fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), Error> {
     let (backend, stop) = (BackendChoice::Cpu, AtomicBool::new(false));
     haptize(Bake { scene, backend, measured: Some(0), aim: None, date: "", stop: &stop, progress: &mut |_| () })
 }

@@ -6,14 +6,14 @@
 //! ([`Fault::Unsolved`](super::flags::Fault::Unsolved)).
 
 use crate::{
-    JointMatrix, JointVector,
+    Error, JointMatrix, JointVector,
     contact::{Equilibrium, LiveContact, LiveSolver, Model, Slip, Solvers, Status},
     dataset::{Axis, Dataset, Grid, Surface},
     field::{Flags, Sample},
     joint_matrix::greatest_eigenvalue,
     object::Object,
     scene::{ContactLaw, Scene},
-    sweep::{BakeError, CpuBackend, Direct, build_object, sample, shallow},
+    sweep::{CpuBackend, Direct, build_object, sample, shallow},
 };
 
 /// Configurations at which the stiffness of the torque is looked at, spread over the grid (1). More: a steeper one is
@@ -38,7 +38,7 @@ impl LiveScene {
     ///
     /// # Errors
     /// When its object cannot be built, or its compliance cannot be formed.
-    pub fn new(scene: Scene) -> Result<Self, BakeError> {
+    pub fn new(scene: Scene) -> Result<Self, Error> {
         let object = build_object(&scene)?;
         Self::of(scene, object)
     }
@@ -47,7 +47,7 @@ impl LiveScene {
     ///
     /// # Errors
     /// When its compliance cannot be formed.
-    pub fn of(mut scene: Scene, object: Object) -> Result<Self, BakeError> {
+    pub fn of(mut scene: Scene, object: Object) -> Result<Self, Error> {
         let follows = scene.contact.law != ContactLaw::Rest;
         scene.contact.law = ContactLaw::Rest;
         let direct = Direct::of(&scene, object)?;

@@ -11,7 +11,6 @@ pub mod flags;
 mod force_rows;
 mod friction;
 pub mod graphics;
-mod graphics_error;
 pub mod haptic;
 mod inputs;
 pub mod live;

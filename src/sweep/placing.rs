@@ -1,8 +1,8 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::{BakeError, build_object};
+use super::build_object;
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Model, Proximity},
     object::{Object, corners},
     proxy::{Chain, PRESS_GAP, Posture, Press, inverse_kinematics::approach, of_last_link},
@@ -66,7 +66,7 @@ impl Placing {
     ///
     /// # Errors
     /// When the object is refused.
-    pub fn new(scene: &Scene, wanted: Option<DVec3>) -> Result<Option<Self>, BakeError> {
+    pub fn new(scene: &Scene, wanted: Option<DVec3>) -> Result<Option<Self>, Error> {
         if scene.proxy.joints.iter().all(|joint| joint.nodes.is_empty()) {
             return Ok(None);
         }
@@ -78,7 +78,7 @@ impl Placing {
     ///
     /// # Errors
     /// When the object is refused.
-    pub fn brought(scene: &Scene) -> Result<Option<(DVec3, Self)>, BakeError> {
+    pub fn brought(scene: &Scene) -> Result<Option<(DVec3, Self)>, Error> {
         let (mut object, chain) = (build_object(scene)?, Chain::new(&scene.proxy));
         let body = corners(&object.rest[..object.surface_nodes]);
         let standoff = PRESS_GAP * length(body);
@@ -108,12 +108,7 @@ impl Placing {
     }
 
     /// The same for `object`, which was built of the scene and perhaps moved; begins from `posture`, where there is one.
-    fn from(
-        scene: &Scene,
-        object: &Object,
-        wanted: Option<DVec3>,
-        posture: Option<&Posture>,
-    ) -> Result<Self, BakeError> {
+    fn from(scene: &Scene, object: &Object, wanted: Option<DVec3>, posture: Option<&Posture>) -> Result<Self, Error> {
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
         let model = Model::reaching(object, &chain, scene.contact, &[])?;

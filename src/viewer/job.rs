@@ -7,17 +7,14 @@ use super::{
     loaded::Loaded,
 };
 use crate::{
+    Error, ErrorKind,
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
     proxy::Chain,
     scene::Scene,
-    sweep::{
-        BackendChoice, ChosenBackend, Progress, Run, SweepError, build_object, is_worth_a_gpu, model_of, remedied,
-        sweep_of,
-    },
+    sweep::{BackendChoice, ChosenBackend, Progress, Run, build_object, is_worth_a_gpu, model_of, remedied, sweep_of},
 };
 use std::{
-    error::Error,
     fmt,
     path::PathBuf,
     sync::{
@@ -154,7 +151,7 @@ impl Job {
             };
             let outcome = match run(task, &solver, &context, &flag, &mut progress) {
                 Ok(loaded) => JobResult::Loaded(Box::new(loaded)),
-                Err(error) if is_cancelled(error.as_ref()) => JobResult::Cancelled,
+                Err(error) if error.kind() == ErrorKind::Stopped => JobResult::Cancelled,
                 Err(error) => JobResult::Failed(remedied(&error.to_string(), ON_THE_CPU)),
             };
             let _ = sender.send(Report::Over(outcome));
@@ -208,15 +205,13 @@ impl Drop for Job {
     }
 }
 
-type Failure = Box<dyn Error + Send + Sync>;
-
 fn run(
     task: Task,
     solver: &Solver,
     context: &Arc<Context>,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
-) -> Result<(Loaded, Option<Body>), Failure> {
+) -> Result<(Loaded, Option<Body>), Error> {
     let loaded = match task {
         Task::Open(path) if Scene::is_at(&path) => Loaded::live(Scene::load(&path)?)?,
         Task::Open(path) => {
@@ -236,7 +231,7 @@ fn bake(
     context: &Arc<Context>,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
-) -> Result<Loaded, Failure> {
+) -> Result<Loaded, Error> {
     let object = match surface {
         Some(surface) => surface.object(&scene.object)?,
         None => build_object(&scene)?,
@@ -271,10 +266,6 @@ fn bake(
     let mut loaded = Loaded::new(dataset, Some(scene), None)?;
     loaded.report = Some(Arc::new(report));
     Ok(loaded)
-}
-
-fn is_cancelled(error: &(dyn Error + 'static)) -> bool {
-    matches!(error.downcast_ref::<SweepError>(), Some(SweepError::Stopped { .. }))
 }
 
 #[cfg(test)]

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 use haptize::{
-    JointVector,
+    Error, JointVector,
     contact::Model,
     dataset::Surface,
-    object::{Object, ObjectError},
+    object::Object,
     proxy::Chain,
     scene::{
         ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec,
@@ -146,7 +146,7 @@ fn layers_by_a_wide_sphere_are_springs_in_series() {
     check_series(&object, 0.1, 0.04, 0.0016, [3.0 * YOUNG, YOUNG]);
 }
 
-fn ball(cell: f64, inclusions: Vec<InclusionSpec>) -> Result<Object, ObjectError> {
+fn ball(cell: f64, inclusions: Vec<InclusionSpec>) -> Result<Object, Error> {
     let shape = Shape::Icosphere { centre: DVec3::ZERO, radius: 0.05, divisions: 12 };
     Object::build(&spec(shape, 0.3, Some(cell), inclusions))
 }
@@ -216,10 +216,7 @@ fn the_last_of_overlapping_inclusions_counts() {
     assert!(same(DVec3::ZERO) && !same(DVec3::X * 0.025));
     for hidden in [vec![core, stiff], vec![stiff, sphere(DVec3::X, 0.01, 1e5, 0.3)]] {
         let hidden = ball(hidden).unwrap_err();
-        assert!(
-            matches!(hidden, ObjectError::EmptyInclusion { .. }) && hidden.to_string().contains("no part"),
-            "{hidden}"
-        );
+        assert!(hidden.to_string().contains("no part of the solid is in the inclusion"), "{hidden}");
     }
 }
 

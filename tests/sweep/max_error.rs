@@ -10,7 +10,7 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::Scene,
-    sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError},
+    sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot},
 };
 use serde_json::Value;
 use std::{path::Path, sync::atomic::AtomicBool};
@@ -178,7 +178,7 @@ fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
     let pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
     let choice = pilot.choose(&scene, usize::MAX, BackendChoice::Cpu).unwrap();
     assert!(pilot.prospects.iter().all(|prospect| prospect.points >= pilot.prospects[0].points));
-    assert!(matches!(pilot.choose(&scene, 10, BackendChoice::Cpu), Err(PilotError::OutOfReach(_))));
+    assert!(pilot.choose(&scene, 10, BackendChoice::Cpu).is_err());
     let bake = haptize::sweep::Bake {
         scene: &choice.scene,
         backend: BackendChoice::Cpu,

@@ -32,9 +32,9 @@ pub mod space;
 
 pub use block::{Block, Nodes};
 pub(crate) use space::Cell;
-pub use space::{Place, Space, SpaceError};
+pub use space::{Place, Space};
 
-use crate::{MAX_JOINTS, dataset::Grid};
+use crate::{Error, MAX_JOINTS, dataset::Grid, error};
 pub(crate) use block::beyond;
 pub use levels::Root;
 use levels::linear;
@@ -70,31 +70,6 @@ impl Hasher for KeyHasher {
         // Tables take the low bits, and the highest.
         self.0 = key.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(u64::BITS / 2);
     }
-}
-
-/// A block was not published; the store is as before.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PublishError {
-    /// The block lies outside the space, or its columns do not belong together.
-    #[error("block {key:#x} of the store is not sound")]
-    Unsound {
-        /// Its key.
-        key: u64,
-    },
-    /// A block of the level below is missing.
-    #[error("block {key:#x} of the store comes before block {missing:#x}, on which it rests")]
-    Order {
-        /// Its key.
-        key: u64,
-        /// That of the other.
-        missing: u64,
-    },
-    /// It is there.
-    #[error("block {key:#x} of the store is there twice")]
-    Taken {
-        /// Its key.
-        key: u64,
-    },
 }
 
 impl Store {
@@ -149,24 +124,26 @@ impl Store {
     /// Publishes a block: its nodes, of those that [`Space::nodes`] names.
     ///
     /// # Errors
-    /// [`PublishError`].
-    pub fn publish(&mut self, level: u32, place: &Place, nodes: Nodes) -> Result<(), PublishError> {
+    /// When the block lies outside the space, its columns do not belong together, a block of the level below is missing,
+    /// or it is there already.
+    pub fn publish(&mut self, level: u32, place: &Place, nodes: Nodes) -> Result<(), Error> {
         let key = self.space.key(level, place);
         if self.space.block(key) != Some((level, *place)) {
-            return Err(PublishError::Unsound { key });
+            return Err(error!("block {key:#x} of the store is not sound"));
         }
         let all: Vec<(usize, Place)> = self.space.nodes(level, place).collect();
         let allowed = all.iter().fold(0, |set, (place, _)| set | 1 << place);
         if !nodes.is_sound(self.space.joints(), allowed) {
-            return Err(PublishError::Unsound { key });
+            return Err(error!("block {key:#x} of the store is not sound"));
         }
         for (at, below) in self.foundation(level, place) {
             if self.get(at, &below).is_none() {
-                return Err(PublishError::Order { key, missing: self.space.key(at, &below) });
+                let missing = self.space.key(at, &below);
+                return Err(error!("block {key:#x} of the store comes before block {missing:#x}, on which it rests"));
             }
         }
         if self.blocks.contains_key(&key) {
-            return Err(PublishError::Taken { key });
+            return Err(error!("block {key:#x} of the store is there twice"));
         }
         let surplus = [self.surplus(level, &all, &nodes), self.slip_surplus(level, &all, &nodes)];
         self.blocks.insert(key, Block::new(nodes, surplus));

@@ -6,7 +6,7 @@
 //! across blocks takes all of their nodes, with blocks of 2^d nodes 1.5^d times as many as it has corners on average. A
 //! key packs a level and the coordinates of a block into 64 bits, ascending with the level.
 
-use crate::{MAX_JOINTS, dataset::Grid};
+use crate::{Error, MAX_JOINTS, dataset::Grid, error};
 
 /// Coordinates of a node or a block, one for each joint; the others are zero.
 pub type Place = [u32; MAX_JOINTS];
@@ -32,30 +32,6 @@ pub struct Space {
     shift: u32,
 }
 
-/// A grid cannot be refined so often.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SpaceError {
-    /// The base is no grid.
-    #[error("{0}")]
-    Grid(String),
-    /// Nothing can be halved.
-    #[error("axis {axis} has one grid line: refinement needs two or more along each axis")]
-    Flat {
-        /// Its name.
-        axis: String,
-    },
-    /// Coordinates do not fit into a key.
-    #[error("{levels} levels above axis {axis} are more than can be numbered: at most {most} are possible")]
-    Levels {
-        /// Its name.
-        axis: String,
-        /// Levels asked for, the base included.
-        levels: u32,
-        /// Levels that fit, the base included.
-        most: u32,
-    },
-}
-
 /// The cell around a configuration at one level.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
@@ -69,22 +45,25 @@ impl Space {
     /// The space over `base` with `levels` levels, the base included.
     ///
     /// # Errors
-    /// [`SpaceError`].
-    pub fn new(base: &Grid, levels: u32) -> Result<Self, SpaceError> {
-        base.check().map_err(SpaceError::Grid)?;
+    /// When the base is no grid, or cannot be halved so often.
+    pub fn new(base: &Grid, levels: u32) -> Result<Self, Error> {
+        base.check()?;
         let joints = base.joints();
         let bits = (u64::BITS - LEVEL_BITS) / joints as u32;
         let shift = u32::from(joints <= MOST_BLOCK_JOINTS);
         for axis in &base.axes {
+            let name = &axis.name;
             if axis.count < 2 {
-                return Err(SpaceError::Flat { axis: axis.name.clone() });
+                return Err(error!("axis {name} has one grid line: refinement needs two or more along each axis"));
             }
             // Coordinates of nodes are below 2^31 and those of blocks below 2^bits.
             let limit = 1_u64 << (bits + shift).min(31);
             let fits = |levels: &u32| (axis.count as u64 - 1) < limit >> (levels - 1);
             let most = (1..=MAX_LEVELS).take_while(fits).last().unwrap_or(0);
             if levels > most {
-                return Err(SpaceError::Levels { axis: axis.name.clone(), levels, most });
+                return Err(error!(
+                    "{levels} levels above axis {name} are more than can be numbered: at most {most} are possible"
+                ));
             }
         }
         Ok(Self { base: base.clone(), levels: levels.max(1), bits, shift })

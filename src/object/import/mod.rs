@@ -13,9 +13,9 @@ mod polygon;
 mod stl;
 mod text;
 
-use super::{Body, ObjectError, topology::place};
-use crate::input;
+use super::{Body, out_of_range, topology::place};
 use crate::scene::Placement;
+use crate::{Error, ErrorKind, input};
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;
@@ -32,15 +32,17 @@ type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 const MAX_BYTES: u64 = 1 << 28;
 
 /// Reads the surface in `file`; merged nodes are reported in `warnings`.
-pub(crate) fn read(file: &Path, placement: &Placement, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
+pub(crate) fn read(file: &Path, placement: &Placement, warnings: &mut Vec<String>) -> Result<Surface, Error> {
     check_scale(placement)?;
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+    let unreadable = |reason: String| unreadable(file, &reason);
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let reader = match extension.as_str() {
         "obj" => obj::read,
         "stl" => stl::read,
         "ply" => ply::read,
-        _ => return Err(ObjectError::Format { file: file.to_owned() }),
+        _ => {
+            return Err(Error::at(file, "not a known mesh format: give a file that ends in .obj, .stl or .ply"));
+        }
     };
     let (nodes, mut triangles) = reader(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
     let count = nodes.len();
@@ -66,9 +68,9 @@ pub(super) fn read_tetrahedra(
     placement: &Placement,
     wanted: &[u32],
     warnings: &mut Vec<String>,
-) -> Result<Body, ObjectError> {
+) -> Result<Body, Error> {
     check_scale(placement)?;
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+    let unreadable = |reason: String| unreadable(file, &reason);
     let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
     let nodes = placement.place(mesh.nodes);
     warnings.extend(oversize(file, placement, &nodes));
@@ -93,13 +95,9 @@ pub(crate) fn length(nodes: &[DVec3]) -> f64 {
 }
 
 /// Refuses a scale that a specification made in code may have.
-fn check_scale(placement: &Placement) -> Result<(), ObjectError> {
+fn check_scale(placement: &Placement) -> Result<(), Error> {
     let value = placement.scale;
-    if value > 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(ObjectError::Parameter { name: "scale", value, range: "positive and finite" })
-    }
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(out_of_range("scale", value, "positive and finite")) }
 }
 
 /// A warning where the scale was forgotten.
@@ -114,9 +112,14 @@ fn oversize(file: &Path, Placement { scale, .. }: &Placement, nodes: &[DVec3]) -
     })
 }
 
+/// The error of a mesh file that cannot be read.
+fn unreadable(file: &Path, reason: &str) -> Error {
+    Error::at(file, format_args!("cannot read the mesh: {reason}")).of(ErrorKind::File)
+}
+
 /// Opens a file of bounded length.
-fn open(file: &Path) -> Result<File, ObjectError> {
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+fn open(file: &Path) -> Result<File, Error> {
+    let unreadable = |reason: String| unreadable(file, &reason);
     let stream = input::open(file).map_err(|error| unreadable(error.to_string()))?;
     let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
     if attributes.len() > MAX_BYTES {

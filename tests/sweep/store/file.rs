@@ -2,9 +2,9 @@
 
 use super::fixture::{noise, space, step, store};
 use haptize::{
-    MAX_JOINTS,
+    ErrorKind, MAX_JOINTS,
     contact::Status,
-    dataset::{Axis, Dataset, Error, Grid, Provenance},
+    dataset::{Axis, Dataset, Grid, Provenance},
     store::Store,
 };
 use std::{fs, path::Path, sync::Arc};
@@ -69,7 +69,7 @@ fn a_file_that_is_cut_short_altered_or_of_another_kind_is_refused() {
         altered[at] ^= 4;
         refused(&altered);
     }
-    assert!(matches!(Dataset::open(Path::new("/nowhere")).map(|_| ()), Err(Error::Read { .. })));
+    assert_eq!(Dataset::open(Path::new("/nowhere")).map(|_| ()).unwrap_err().kind(), ErrorKind::File);
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use super::{Target, mutate, outcome, shipped, write};
 use crate::objects;
-use glam::DVec3;
 use haptize::{
     object::Object,
     scene::{
