@@ -15,10 +15,10 @@
 
 use glam::DVec3;
 use haptize::{
-    JointVector,
+    Error, JointVector,
     dataset::Dataset,
     device::Motion,
-    gpu::{AdapterChoice, Context, FrameError, FrameMethod, FrameUpdate},
+    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate},
     render::{
         graphics::{ContactForces, Graphics, Smoothing},
         haptic::Inputs,
@@ -189,7 +189,7 @@ struct Body {
 
 impl Body {
     /// One per variant; none without graphics.
-    fn all(context: &Arc<Context>, setups: &[Setup], datasets: &[Dataset]) -> Result<Vec<Option<Self>>, FrameError> {
+    fn all(context: &Arc<Context>, setups: &[Setup], datasets: &[Dataset]) -> Result<Vec<Option<Self>>, Error> {
         let body = |(setup, dataset): (&Setup, &Dataset)| {
             let (Some(object), Some(graphics)) = (&setup.object, &setup.scene.graphics) else { return Ok(None) };
             let (nodes, period, method) = (object.rest.len(), 1.0 / graphics.rate, FrameMethod::suitable(object));
@@ -204,7 +204,7 @@ impl Body {
     }
 
     /// A frame for each of `places`, and a wait for the last.
-    fn play(&mut self, places: &[Place]) -> Result<(), FrameError> {
+    fn play(&mut self, places: &[Place]) -> Result<(), Error> {
         for (q, share) in places {
             self.contact.at(q, *share, &mut self.forces);
             let forces = match &mut self.smoothing {

@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "{:<24} {:>10} {:>12} {:>20} {:>18}",
         "", "shared out", "beside that", "alone or awaited", "and behind that"
     );
-    for law in [ContactLaw::Following, ContactLaw::Paper, ContactLaw::Rest] {
+    for law in [ContactLaw::Following, ContactLaw::Rest] {
         scene.contact.law = law;
         for work in [Extent::Solved, Extent::Lowest, Extent::Measured] {
             let mut least = bake(&scene, work)?;

@@ -1,7 +1,7 @@
 //! Tables of text: the one way in which they are written, and in which their lines are read.
 
 use crate::{
-    input,
+    Error, input,
     names::{escaped, is_disruptive},
 };
 use std::{
@@ -10,40 +10,6 @@ use std::{
     io::{self, BufRead, BufReader, Read, Write},
     path::{Path, PathBuf},
 };
-
-/// A table of text cannot be read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TableError {
-    /// The file cannot be read.
-    #[error("{}: cannot be read: {}", .file.display(), input::remedied(source))]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// The file is too large.
-    #[error("{}: larger than {greatest} bytes: {remedy}", .file.display())]
-    Size {
-        /// The file.
-        file: PathBuf,
-        /// Largest file that is read (bytes).
-        greatest: u64,
-        /// What it is not, or what to do.
-        remedy: &'static str,
-    },
-    /// A line is not what it should be.
-    #[error("{}:{line}: {what}", .file.display())]
-    Line {
-        /// The file.
-        file: PathBuf,
-        /// Number of the line, from 1.
-        line: u64,
-        /// Problem and remedy, in words.
-        what: String,
-    },
-}
 
 /// Longest line that is read (bytes); a binary file has no line ends.
 pub(crate) const LONGEST_LINE: u64 = 1 << 20;
@@ -60,11 +26,13 @@ pub(crate) struct Lines<R> {
 
 impl Lines<BufReader<File>> {
     /// Opens `file`, unless it is larger than `greatest` bytes, where `remedy` is what it is not or what to do.
-    pub fn open(file: &Path, greatest: u64, remedy: &'static str) -> Result<Self, TableError> {
+    pub fn open(file: &Path, greatest: u64, remedy: &'static str) -> Result<Self, Error> {
         let opened = input::open(file).and_then(|opened| Ok((opened.metadata()?.len(), opened)));
         match opened {
-            Err(source) => Err(TableError::Read { file: file.into(), source }),
-            Ok((length, _)) if length > greatest => Err(TableError::Size { file: file.into(), greatest, remedy }),
+            Err(source) => Err(Error::unreadable(file, &source)),
+            Ok((length, _)) if length > greatest => {
+                Err(Error::at(file, format_args!("larger than {greatest} bytes: {remedy}")))
+            }
             Ok((_, opened)) => Ok(Self::new(file, BufReader::new(opened))),
         }
     }
@@ -77,15 +45,17 @@ impl<R: BufRead> Lines<R> {
     }
 
     /// An error in the line read last.
-    pub fn error(&self, what: impl Into<String>) -> TableError {
-        TableError::Line { file: self.file.clone(), line: self.number, what: what.into() }
+    pub fn error(&self, what: impl Display) -> Error {
+        Error::on_line(&self.file, self.number, what)
     }
 
     /// Reads a line into `line`, without its end and without a byte order mark; none at the end of the text.
-    pub fn next<'l>(&mut self, line: &'l mut Vec<u8>) -> Result<Option<&'l [u8]>, TableError> {
+    pub fn next<'l>(&mut self, line: &'l mut Vec<u8>) -> Result<Option<&'l [u8]>, Error> {
         line.clear();
         let read = self.reader.by_ref().take(LONGEST_LINE).read_until(b'\n', line);
-        let read = read.map_err(|source| TableError::Read { file: self.file.clone(), source })? as u64;
+        let read = read
+            .map_err(|source| source.downcast().unwrap_or_else(|source| Error::unreadable(&self.file, &source)))?
+            as u64;
         if read == 0 {
             return Ok(None);
         }
@@ -103,7 +73,7 @@ impl<R: BufRead> Lines<R> {
     }
 
     /// Reads a line of text into `line`, as [`Lines::next`] does.
-    pub fn next_text<'l>(&mut self, line: &'l mut Vec<u8>) -> Result<Option<&'l str>, TableError> {
+    pub fn next_text<'l>(&mut self, line: &'l mut Vec<u8>) -> Result<Option<&'l str>, Error> {
         let text = self.next(line)?.map(std::str::from_utf8).transpose();
         text.map_err(|_| self.error("not text in UTF-8"))
     }

@@ -74,11 +74,9 @@ pub fn solve_positive(matrix: &JointMatrix, b: &mut JointVector) {
 /// Most sweeps of Jacobi's method (1): it converges quadratically, six rows to rounding in five or six.
 const SWEEPS: usize = 12;
 
-/// Returns the symmetric positive semidefinite square root of the leading `joints` rows and columns of a symmetric
-/// `matrix`, its negative eigenvalues taken for zero; the rest is zero. By Jacobi's method (Golub and Van Loan, Matrix
-/// Computations, section 8.5). Allocates nothing.
-#[must_use]
-pub fn square_root(matrix: &JointMatrix, joints: usize) -> JointMatrix {
+/// Eigenvalues of the leading `joints` rows and columns of a symmetric `matrix`, on a diagonal, and their vectors as
+/// columns. By Jacobi's method (Golub and Van Loan, Matrix Computations, section 8.5). Allocates nothing.
+fn eigenvalues(matrix: &JointMatrix, joints: usize) -> (JointMatrix, JointMatrix) {
     let mut diagonal = *matrix;
     let mut vectors = [[0.0; MAX_JOINTS]; MAX_JOINTS];
     vectors.iter_mut().enumerate().for_each(|(k, row)| row[k] = 1.0);
@@ -93,6 +91,21 @@ pub fn square_root(matrix: &JointMatrix, joints: usize) -> JointMatrix {
             break;
         }
     }
+    (diagonal, vectors)
+}
+
+/// Greatest eigenvalue of the leading `joints` rows and columns of a symmetric `matrix`. Allocates nothing.
+#[must_use]
+pub fn greatest_eigenvalue(matrix: &JointMatrix, joints: usize) -> f64 {
+    let (diagonal, _) = eigenvalues(matrix, joints);
+    (0..joints).map(|k| diagonal[k][k]).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Returns the symmetric positive semidefinite square root of the leading `joints` rows and columns of a symmetric
+/// `matrix`, its negative eigenvalues taken for zero; the rest is zero. Allocates nothing.
+#[must_use]
+pub fn square_root(matrix: &JointMatrix, joints: usize) -> JointMatrix {
+    let (diagonal, vectors) = eigenvalues(matrix, joints);
     let mut root = [[0.0; MAX_JOINTS]; MAX_JOINTS];
     for i in 0..joints {
         let size = diagonal[i][i].max(0.0).sqrt();
@@ -136,6 +149,38 @@ mod tests {
     /// The square of the leading rows, and the greatest entry of a difference.
     fn square(root: &JointMatrix) -> JointMatrix {
         root.map(|row| std::array::from_fn(|l| row.iter().zip(root).map(|(a, other)| a * other[l]).sum()))
+    }
+
+    #[test]
+    fn the_greatest_eigenvalue_is_the_greatest_of_rayleighs_quotients() {
+        let mut random = Random::new(11);
+        for joints in 1..=MAX_JOINTS {
+            let mut matrix = JointMatrix::default();
+            for k in 0..joints {
+                (0..=k).for_each(|l| add_symmetric(&mut matrix, k, l, random.between(-1.0, 1.0)));
+            }
+            let greatest = greatest_eigenvalue(&matrix, joints);
+            let times = |x: &JointVector| {
+                let mut product = JointVector::zeros(joints);
+                product
+                    .iter_mut()
+                    .zip(&matrix)
+                    .for_each(|(y, row)| *y = row.iter().zip(x.iter()).map(|(a, b)| a * b).sum());
+                product
+            };
+            // Power iteration on M + c 1, whose eigenvalues are positive.
+            let mut x = JointVector::zeros(joints);
+            x.iter_mut().for_each(|entry| *entry = random.between(0.5, 1.0));
+            for _ in 0..4000 {
+                let mut next = times(&x);
+                next.iter_mut().zip(x.iter()).for_each(|(next, x)| *next += 6.0 * x);
+                let length = next.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
+                next.iter_mut().for_each(|entry| *entry /= length);
+                x = next;
+            }
+            let quotient: f64 = times(&x).iter().zip(x.iter()).map(|(a, b)| a * b).sum();
+            assert!((greatest - quotient).abs() < 1e-6, "{joints} joints: {greatest} and {quotient}");
+        }
     }
 
     #[test]

@@ -100,6 +100,8 @@ pub mod render;
 pub mod draw;
 pub mod report;
 
+pub mod paper;
+
 pub mod studies;
 
 #[cfg(feature = "viewer")]
@@ -108,6 +110,7 @@ pub mod viewer;
 pub mod cli;
 
 mod csv;
+mod error;
 mod input;
 pub mod joint_matrix;
 mod joint_vector;
@@ -116,6 +119,7 @@ mod names;
 mod random;
 mod toml_text;
 
-pub use csv::TableError;
+pub(crate) use error::error;
+pub use error::{Error, ErrorKind, Location};
 pub use joint_matrix::JointMatrix;
-pub use joint_vector::{JointVector, MAX_JOINTS};
+pub use joint_vector::{JointVector, MAX_AXES, MAX_JOINTS};

@@ -1,11 +1,13 @@
-/* The C interface of haptize: torques looked up in a dataset, the passive haptic loop, direct equilibria.
+/* The C interface of haptize: torques looked up in a dataset or solved live, the passive haptic loop,
+ * direct equilibria.
  *
  * - Handles are opaque. Each is made by a function ..._open and closed by ..._close. None is shared with another library.
  * - Results are hz_code: negative where the call failed. Nothing is thrown, no panic leaves the library.
  * - Text is UTF-8. A message is written into the caller's buffer, cut where it does not fit, always ended by a zero.
  * - A structure begins with its own size, to be set before the call: later versions of the library only make structures longer.
  * - All quantities are SI: m, rad, N, N m, kg, s, J. Joint vectors have one entry per joint of the arm.
- * - Real-time safe, allocating nothing and waiting for nothing: hz_field_torque, hz_field_sample, hz_field_bounds, hz_loop_start, hz_loop_tick.
+ * - Real-time safe, allocating nothing and waiting for nothing: hz_field_torque, hz_field_sample, hz_field_bounds, hz_live_sample,
+ *   hz_loop_start, hz_loop_tick.
  *   Torques of hz_loop_tick are limited in size and rate; whatever is wrong with a device's position, they go to zero.
  *
  * This file is made by cbindgen from the sources in capi/src. Do not edit it.
@@ -20,7 +22,7 @@
 // Number of this interface. A program that was compiled with another one must not be run with this library.
 #define HZ_ABI 1
 
-// Most joints that an arm may have.
+// Most joints that an arm may have here.
 #define HZ_MAX_JOINTS 6
 
 // How a call ended. Below zero it failed, and nothing but zeros was written to its results.
@@ -58,6 +60,9 @@ typedef int32_t hz_code;
 
 // The torque field of a dataset. Any number of threads may look it up at once.
 typedef struct hz_field hz_field;
+
+// The contact of a scene, before the surface at rest. One thread at a time may use it.
+typedef struct hz_live hz_live;
 
 // A haptic loop: the virtual proxy, its coupling to the device, the torque field, and the watchdog. One thread at a
 // time may use it.
@@ -209,10 +214,12 @@ hz_code hz_field_sample(const struct hz_field *field, const double *q, struct hz
 hz_code hz_field_torques(const struct hz_field *field, size_t count, const double *q, double *tau, uint8_t *status);
 
 // Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the
-// scene's where that is not NULL. The file is not needed afterwards.
+// scene's where that is not NULL. A path that ends in .toml is that of a scene: nothing of it is baked, and contact is
+// solved in every tick, before the surface at rest. The file is not needed afterwards.
 //
 // On success `*loop` is to be closed with hz_loop_close, and `message`, `message_size` bytes that may be NULL, names
-// the gains that are beyond their passivity bound, each with a remedy; it is empty where there are none. On failure
+// the gains that are beyond their passivity bound, each with a remedy, and says where contact is solved otherwise than
+// the scene has it; it is empty where there is nothing to say. On failure
 // `*loop` is NULL and `message` says why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
 //
 // Pointers:
@@ -268,6 +275,38 @@ hz_code hz_loop_tick(struct hz_loop *loop, const double *y, double age, double d
 // Pointers:
 // `loop` is NULL or open; `message` is NULL or has `message_size` bytes.
 hz_code hz_loop_fault(const struct hz_loop *loop, char *message, size_t message_size);
+
+// Reads the scene file at `path` (UTF-8) and prepares its object and arm. That takes up to some seconds.
+//
+// On success `*live` is to be closed with hz_live_close, and `message`, `message_size` bytes that may be NULL, says
+// where contact is solved otherwise than the scene has it; on failure `*live` is NULL and `message` says why, with file
+// and line. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE or HZ_SCENE.
+//
+// Pointers:
+// All are NULL or as described.
+hz_code hz_live_open(const char *path, struct hz_live **live, char *message, size_t message_size);
+
+// Closes it; NULL is left alone. No other call may be using it.
+//
+// Pointers:
+// `live` is NULL or one that was opened and not yet closed.
+void hz_live_close(struct hz_live *live);
+
+// Returns the number of joints, 1 to HZ_MAX_JOINTS; 0 for NULL.
+//
+// Pointers:
+// `live` is NULL or open.
+uint32_t hz_live_joints(const struct hz_live *live);
+
+// Solves contact at the configuration `q`, one entry per joint (rad; m): fast along a way, where `q` is near the one
+// before. Real-time safe: it allocates, locks and prints nothing, and waits for nothing; its work is bounded.
+//
+// Returns HZ_OK; HZ_UNCONVERGED where contact is larger than what is solved, with what was solved last; HZ_ARGUMENT,
+// with zeros, for NULL or a `q` that is not finite.
+//
+// Pointers:
+// `live` is NULL or open; `q` is NULL or has one entry per joint; `sample` is NULL or tells its size.
+hz_code hz_live_sample(struct hz_live *live, const double *q, struct hz_sample *sample);
 
 // Reads the scene file at `path` (UTF-8) and prepares its object and arm. That takes up to some seconds.
 //

@@ -4,7 +4,13 @@ use crate::{
     HZ_MAX_JOINTS,
     outcome::{self, Extensible, Told, guarded, hz_code},
 };
-use haptize::{JointVector, contact::Status, dataset::Dataset, field::TorqueField, render::setup};
+use haptize::{
+    JointVector,
+    contact::Status,
+    dataset::Dataset,
+    field::{Sample, TorqueField},
+    render::setup,
+};
 use std::{ffi::c_char, mem::offset_of};
 
 /// The torque field of a dataset. Any number of threads may look it up at once.
@@ -146,14 +152,7 @@ pub unsafe extern "C" fn hz_field_sample(field: *const hz_field, q: *const f64, 
         // SAFETY: as the caller promises. `q` is copied before anything is written: it may lie within the sample.
         let q = unsafe { configuration(q, field.field.joints()) };
         let found = q.map(|q| field.field.sample(&q));
-        let told = found.as_ref().map_or_else(hz_sample::default, |found| hz_sample {
-            size: 0,
-            torque: found.torque.padded(),
-            energy: found.energy,
-            index: found.index,
-            status: found.status() as u32,
-            contact_nodes: found.contact_nodes,
-        });
+        let told = found.as_ref().map_or_else(hz_sample::default, told_sample);
         // SAFETY: as the caller promises; nothing borrows `q` any more.
         unsafe { out.write(&told) };
         found.map_or(hz_code::HZ_ARGUMENT, |found| code(found.status()))
@@ -216,7 +215,20 @@ fn overlap(a: *const f64, b: *const f64, entries: usize) -> bool {
     a.addr().abs_diff(b.addr()) < entries * size_of::<f64>()
 }
 
-fn code(status: Status) -> hz_code {
+/// `found` as it is told.
+pub fn told_sample(found: &Sample) -> hz_sample {
+    hz_sample {
+        size: 0,
+        torque: crate::padded(&found.torque),
+        energy: found.energy,
+        index: found.index,
+        status: found.status() as u32,
+        contact_nodes: found.contact_nodes,
+    }
+}
+
+/// How a look-up ended that found `status`.
+pub fn code(status: Status) -> hz_code {
     match status {
         Status::Free | Status::Contact => hz_code::HZ_OK,
         Status::Unconverged | Status::Overflow => hz_code::HZ_UNCONVERGED,

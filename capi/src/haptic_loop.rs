@@ -8,19 +8,15 @@ use crate::{
 use haptize::{
     JointVector,
     dataset::Dataset,
-    render::{
-        haptic::{Haptics, Inputs, State},
-        setup::Setup,
-    },
-    scene::HapticsSpec,
+    render::{driven::DrivenLoop, haptic::Inputs, live::LiveScene, setup::Setup},
+    scene::{HapticsSpec, Scene},
 };
 use std::{ffi::c_char, mem::offset_of, sync::Arc};
 
 /// A haptic loop: the virtual proxy, its coupling to the device, the torque field, and the watchdog. One thread at a
 /// time may use it.
 pub struct hz_loop {
-    haptics: Arc<Haptics>,
-    state: State,
+    of: DrivenLoop,
     started: bool,
 }
 
@@ -69,10 +65,12 @@ unsafe impl Extensible for hz_tick {
 }
 
 /// Opens the dataset file at `path` (UTF-8) and makes the haptic loop of its scene, with `gains` in the place of the
-/// scene's where that is not NULL. The file is not needed afterwards.
+/// scene's where that is not NULL. A path that ends in .toml is that of a scene: nothing of it is baked, and contact is
+/// solved in every tick, before the surface at rest. The file is not needed afterwards.
 ///
 /// On success `*loop` is to be closed with hz_loop_close, and `message`, `message_size` bytes that may be NULL, names
-/// the gains that are beyond their passivity bound, each with a remedy; it is empty where there are none. On failure
+/// the gains that are beyond their passivity bound, each with a remedy, and says where contact is solved otherwise than
+/// the scene has it; it is empty where there is nothing to say. On failure
 /// `*loop` is NULL and `message` says why. Returns HZ_OK, HZ_ARGUMENT, HZ_FILE, HZ_FORMAT or HZ_SCENE.
 ///
 /// # Safety
@@ -87,8 +85,17 @@ pub unsafe extern "C" fn hz_loop_open(
 ) -> hz_code {
     let make = || {
         // SAFETY: as the caller promises.
-        let dataset = Dataset::open(unsafe { outcome::path(path)? })?;
-        let setup = Setup::new(&dataset)?;
+        let path = unsafe { outcome::path(path)? };
+        let (dataset, setup, notice) = if Scene::is_at(path) {
+            let scene = Arc::new(LiveScene::new(Scene::load(path)?)?);
+            let (dataset, notice) = (scene.dataset(), scene.notice());
+            let setup = Setup::live(scene, &dataset)?;
+            (dataset, setup, notice)
+        } else {
+            let dataset = Dataset::open(path)?;
+            let setup = Setup::new(&dataset)?;
+            (dataset, setup, None)
+        };
         let (haptics, advice) = if gains.is_null() {
             (setup.haptics.clone(), setup.advice)
         } else {
@@ -100,9 +107,11 @@ pub unsafe extern "C" fn hz_loop_open(
             let (haptics, advice) = setup.retuned(&dataset, &spec)?;
             (Arc::new(haptics), advice)
         };
+        crate::check_joints(haptics.joints())?;
         let begin = JointVector::zeros(haptics.joints());
-        let state = haptics.start(&begin).map_err(|fault| argument(fault.to_string()))?;
-        Ok((hz_loop { haptics, state, started: false }, advice.unwrap_or_default()))
+        let of = DrivenLoop::new(haptics, &begin).map_err(|fault| argument(fault.to_string()))?;
+        let remarks: Vec<String> = advice.into_iter().chain(notice.map(str::to_owned)).collect();
+        Ok((hz_loop { of, started: false }, remarks.join("\n")))
     };
     // SAFETY: as the caller promises.
     unsafe { outcome::open(r#loop, message, message_size, make) }
@@ -141,7 +150,7 @@ pub unsafe extern "C" fn hz_loop_close(r#loop: *mut hz_loop) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_loop_joints(r#loop: *const hz_loop) -> u32 {
     // SAFETY: as the caller promises.
-    unsafe { r#loop.as_ref() }.map_or(0, |of| of.haptics.joints() as u32)
+    unsafe { r#loop.as_ref() }.map_or(0, |handle| handle.of.haptics().joints() as u32)
 }
 
 /// Returns the time between two ticks for which the gains are meant (s); 0 for NULL.
@@ -151,7 +160,7 @@ pub unsafe extern "C" fn hz_loop_joints(r#loop: *const hz_loop) -> u32 {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hz_loop_period(r#loop: *const hz_loop) -> f64 {
     // SAFETY: as the caller promises.
-    unsafe { r#loop.as_ref() }.map_or(0.0, |of| of.haptics.period())
+    unsafe { r#loop.as_ref() }.map_or(0.0, |handle| handle.of.haptics().period())
 }
 
 /// Begins at the device's position `y`, one entry per joint (rad; m): before the first tick, and to end a fault. The
@@ -166,12 +175,12 @@ pub unsafe extern "C" fn hz_loop_period(r#loop: *const hz_loop) -> f64 {
 pub unsafe extern "C" fn hz_loop_start(r#loop: *mut hz_loop, y: *const f64) -> hz_code {
     guarded(|| {
         // SAFETY: as the caller promises.
-        let Some(of) = (unsafe { r#loop.as_mut() }) else { return hz_code::HZ_ARGUMENT };
+        let Some(hz_loop { of, started }) = (unsafe { r#loop.as_mut() }) else { return hz_code::HZ_ARGUMENT };
         // SAFETY: as the caller promises.
-        let Some(position) = (unsafe { configuration(y, of.haptics.joints()) }) else { return hz_code::HZ_ARGUMENT };
-        match of.haptics.restart(&mut of.state, &position) {
+        let Some(position) = (unsafe { configuration(y, of.haptics().joints()) }) else { return hz_code::HZ_ARGUMENT };
+        match of.restart(&position) {
             Ok(()) => {
-                of.started = true;
+                *started = true;
                 hz_code::HZ_OK
             }
             Err(_) => hz_code::HZ_ARGUMENT,
@@ -201,8 +210,8 @@ pub unsafe extern "C" fn hz_loop_tick(
 ) -> hz_code {
     guarded(|| {
         // SAFETY: as the caller promises.
-        let Some(of) = (unsafe { r#loop.as_mut() }) else { return hz_code::HZ_ARGUMENT };
-        let joints = of.haptics.joints();
+        let Some(hz_loop { of, started }) = (unsafe { r#loop.as_mut() }) else { return hz_code::HZ_ARGUMENT };
+        let joints = of.haptics().joints();
         // SAFETY: as the caller promises. `y` is copied before anything is written: it may lie where `tau` does.
         let y = unsafe { outcome::slice(y, joints) }.map(JointVector::from_slice);
         // SAFETY: as the caller promises; nothing borrows `y` any more.
@@ -210,17 +219,17 @@ pub unsafe extern "C" fn hz_loop_tick(
         tau.fill(0.0);
         // SAFETY: as the caller promises.
         let (Some(position), info) = (y, unsafe { Told::new(tick) }) else { return hz_code::HZ_ARGUMENT };
-        if !of.started || (info.is_none() && !tick.is_null()) {
+        if !*started || (info.is_none() && !tick.is_null()) {
             return hz_code::HZ_ARGUMENT;
         }
         let inputs = Inputs { position, age, elapsed: dt, interval: dt };
-        let output = of.haptics.tick(&mut of.state, &inputs);
+        let output = of.tick(&inputs);
         tau.copy_from_slice(&output.torque);
         if let Some(info) = info {
             let told = hz_tick {
                 size: 0,
-                proxy: output.proxy.padded(),
-                contact_torque: output.sample.torque.padded(),
+                proxy: crate::padded(&output.proxy),
+                contact_torque: crate::padded(&output.sample.torque),
                 energy: output.sample.energy,
                 contact: output.sample.contact.into(),
                 flags: output.flags.bits().into(),
@@ -243,8 +252,8 @@ pub unsafe extern "C" fn hz_loop_tick(
 pub unsafe extern "C" fn hz_loop_fault(r#loop: *const hz_loop, message: *mut c_char, message_size: usize) -> hz_code {
     guarded(|| {
         // SAFETY: as the caller promises.
-        let Some(of) = (unsafe { r#loop.as_ref() }) else { return hz_code::HZ_ARGUMENT };
-        let fault = of.state.fault();
+        let Some(hz_loop { of, .. }) = (unsafe { r#loop.as_ref() }) else { return hz_code::HZ_ARGUMENT };
+        let fault = of.fault();
         // SAFETY: as the caller promises.
         unsafe {
             match fault {

@@ -7,6 +7,7 @@
 
 mod field;
 mod haptic_loop;
+mod live;
 mod outcome;
 mod solver;
 
@@ -18,6 +19,7 @@ pub use haptic_loop::{
     hz_gains, hz_loop, hz_loop_close, hz_loop_fault, hz_loop_joints, hz_loop_open, hz_loop_period, hz_loop_start,
     hz_loop_tick, hz_tick,
 };
+pub use live::{hz_live, hz_live_close, hz_live_joints, hz_live_open, hz_live_sample};
 pub use outcome::hz_code;
 pub use solver::{
     hz_equilibrium, hz_force, hz_solver, hz_solver_close, hz_solver_joints, hz_solver_open, hz_solver_solve,
@@ -28,10 +30,24 @@ use std::ffi::{CStr, c_char};
 /// Number of this interface. A program that was compiled with another one must not be run with this library.
 pub const HZ_ABI: u32 = 1;
 
-/// Most joints that an arm may have.
+/// Most joints that an arm may have here.
 pub const HZ_MAX_JOINTS: usize = 6;
 
-const _: () = assert!(HZ_MAX_JOINTS == haptize::MAX_JOINTS);
+const _: () = assert!(HZ_MAX_JOINTS <= haptize::MAX_JOINTS && HZ_MAX_JOINTS == haptize::MAX_AXES);
+
+/// Checks that an arm has no more joints than the structures hold.
+fn check_joints(joints: usize) -> Result<(), outcome::Failure> {
+    if joints <= HZ_MAX_JOINTS {
+        return Ok(());
+    }
+    let message = format!("the arm has {joints} joints, and the C interface takes at most {HZ_MAX_JOINTS}");
+    Err(outcome::Failure { code: hz_code::HZ_SCENE, message })
+}
+
+/// The entries, then zeros.
+fn padded(vector: &[f64]) -> [f64; HZ_MAX_JOINTS] {
+    std::array::from_fn(|joint| vector.get(joint).copied().unwrap_or_default())
+}
 
 const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
     Ok(version) => version,

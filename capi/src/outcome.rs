@@ -1,6 +1,6 @@
 //! How a call ended: a code, and where there is more to say a message in the caller's buffer.
 
-use haptize::{dataset, render::setup::SetupError, scene::SceneError, sweep::BakeError};
+use haptize::{Error, ErrorKind, scene::SceneError};
 use std::{
     ffi::{CStr, c_char},
     io::{Cursor, Write},
@@ -43,11 +43,12 @@ pub fn argument(message: impl Into<String>) -> Failure {
     Failure { code: hz_code::HZ_ARGUMENT, message: message.into() }
 }
 
-impl From<dataset::Error> for Failure {
-    fn from(error: dataset::Error) -> Self {
-        let code = match error {
-            dataset::Error::Read { .. } | dataset::Error::Write { .. } => hz_code::HZ_FILE,
-            _ => hz_code::HZ_FORMAT,
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        let code = match error.kind() {
+            ErrorKind::File => hz_code::HZ_FILE,
+            ErrorKind::Dataset | ErrorKind::Foreign => hz_code::HZ_FORMAT,
+            _ => hz_code::HZ_SCENE,
         };
         Self { code, message: error.to_string() }
     }
@@ -55,24 +56,7 @@ impl From<dataset::Error> for Failure {
 
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
-        let code = match error {
-            SceneError::Unreadable { .. } => hz_code::HZ_FILE,
-            _ => hz_code::HZ_SCENE,
-        };
-        Self { code, message: error.to_string() }
-    }
-}
-
-impl From<SetupError> for Failure {
-    fn from(error: SetupError) -> Self {
-        let code = if matches!(error, SetupError::Field(_)) { hz_code::HZ_FORMAT } else { hz_code::HZ_SCENE };
-        Self { code, message: error.to_string() }
-    }
-}
-
-impl From<BakeError> for Failure {
-    fn from(error: BakeError) -> Self {
-        Self { code: hz_code::HZ_SCENE, message: error.to_string() }
+        Error::from(error).into()
     }
 }
 

@@ -249,6 +249,79 @@ fn gains_are_taken_and_their_passivity_bounds_told() {
     assert!(code == hz_code::HZ_ARGUMENT && message.contains("size"), "{message}");
 }
 
+/// A way into contact and out of it.
+fn way() -> impl Iterator<Item = [f64; 2]> {
+    (0..=200).map(|k| PRESSED.map(|q| q * (std::f64::consts::PI * f64::from(k) / 200.0).sin()))
+}
+
+#[test]
+fn a_scene_is_felt_live_as_the_library_solves_it() {
+    let files = Files::new();
+    let path = c_path(&files.path("small.toml"));
+    let direct = Direct::new(&Scene::load(files.path("small.toml")).unwrap()).unwrap();
+    let (code, live, message) = open(|out, text| unsafe { hz_live_open(path.as_ptr(), out, text, ROOM) });
+    assert_eq!((code, message.as_str()), (hz_code::HZ_OK, ""));
+    assert_eq!(unsafe { hz_live_joints(live) }, 2);
+    let mut sample = hz_sample { size: size_of::<hz_sample>(), ..hz_sample::default() };
+    let mut touched = 0;
+    for q in way() {
+        let code = assert_no_alloc(|| unsafe { hz_live_sample(live, q.as_ptr(), &raw mut sample) });
+        let exact = direct.inspect(&q).unwrap();
+        let touches = exact.status == "contact";
+        assert_eq!((code, sample.status, sample.index), (hz_code::HZ_OK, u32::from(touches), f64::from(sample.status)));
+        assert!((sample.energy - exact.energy).abs() <= 1e-12 * exact.energy, "{} {}", sample.energy, exact.energy);
+        for (tau, exact) in sample.torque.iter().zip(&exact.torque) {
+            assert!((tau - exact).abs() <= 1e-9, "{tau} {exact}");
+        }
+        touched += u32::from(touches);
+    }
+    assert!(touched > 20, "{touched}");
+    let refused = hz_code::HZ_ARGUMENT;
+    unsafe {
+        assert_eq!(hz_live_sample(live, [0.0, f64::NAN].as_ptr(), &raw mut sample), refused);
+        assert_eq!((sample.torque, sample.energy), ([0.0; HZ_MAX_JOINTS], 0.0));
+        assert_eq!(hz_live_sample(live, PRESSED.as_ptr(), null_mut()), refused);
+        assert_eq!(hz_live_sample(null_mut(), PRESSED.as_ptr(), &raw mut sample), refused);
+        assert_eq!(hz_live_joints(null()), 0);
+        hz_live_close(live);
+        hz_live_close(null_mut());
+    }
+}
+
+#[test]
+fn the_loop_of_a_scene_is_that_of_its_dataset_with_contact_solved_in_every_tick() {
+    let files = Files::new();
+    let text = common::SCENE.replace("[contact]", "[contact]\nlaw = \"following\"");
+    std::fs::write(files.path("following.toml"), text).unwrap();
+    let opened = |name: &str| {
+        let path = c_path(&files.path(name));
+        open(|out, text| unsafe { hz_loop_open(path.as_ptr(), null(), out, text, ROOM) })
+    };
+    let (code, following, remarks) = opened("following.toml");
+    assert!(code == hz_code::HZ_OK && remarks.contains("before the surface at rest"), "{remarks}");
+    let ((code, live, _), (_, stored, _)) = (opened("small.toml"), opened("small.haptize"));
+    assert_eq!(code, hz_code::HZ_OK);
+    let (mut greatest, mut error) = (0.0_f64, 0.0_f64);
+    unsafe {
+        let period = hz_loop_period(live);
+        for handle in [live, stored] {
+            assert_eq!(hz_loop_start(handle, [0.0; 2].as_ptr()), hz_code::HZ_OK);
+        }
+        for q in way() {
+            let mut taus = [[f64::NAN; 2]; 2];
+            for (handle, tau) in [live, stored].into_iter().zip(&mut taus) {
+                let tick = || hz_loop_tick(handle, q.as_ptr(), 0.0, period, tau.as_mut_ptr(), null_mut());
+                assert_eq!(assert_no_alloc(tick), hz_code::HZ_OK);
+            }
+            greatest = greatest.max(taus[1][1].abs());
+            error = error.max((taus[0][1] - taus[1][1]).abs());
+        }
+        [live, stored, following].into_iter().for_each(|handle| hz_loop_close(handle));
+    }
+    // The small scene's grid is coarse.
+    assert!(greatest > 0.0 && error < 0.2 * greatest && error > 1e-6 * greatest, "{error} of {greatest}");
+}
+
 /// Whatever later versions add: these are the sizes of the first header with this number.
 #[cfg(target_pointer_width = "64")]
 #[test]

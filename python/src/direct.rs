@@ -33,7 +33,7 @@ impl Solver {
     /// Solve the configuration q (rad; m), one entry per joint, from the object at rest.
     fn solve(&self, py: Python<'_>, q: &Bound<'_, PyAny>) -> PyResult<Equilibrium> {
         let q = arrays::vector("q", q, self.direct.joints())?;
-        let inspection = threads::detach(py, || self.direct.inspect(&q))?.map_err(errors::direct)?;
+        let inspection = threads::detach(py, || self.direct.inspect(&q))?.map_err(errors::rows)?;
         Ok(Equilibrium { inspection })
     }
 
@@ -42,7 +42,7 @@ impl Solver {
         let joints = self.direct.joints();
         Configurations::new(q, joints)?.fill(&[joints], None, |q, out: &mut [f64]| {
             let torques = threads::run(|| self.direct.torques(q))?;
-            out.copy_from_slice(&torques.map_err(errors::direct)?.0);
+            out.copy_from_slice(&torques.map_err(errors::rows)?.0);
             Ok(())
         })
     }

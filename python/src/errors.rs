@@ -1,13 +1,6 @@
 //! Exceptions of the package: one kind for each thing that can be wrong, with file and line where there are such.
 
-use haptize::{
-    dataset,
-    field::BatchError,
-    gridize::GridizeError as GridizeFailure,
-    render::setup::SetupError,
-    scene::SceneError as SceneFailure,
-    sweep::{BakeError as BakeFailure, DirectError},
-};
+use haptize::{Error as Failure, ErrorKind};
 use pyo3::{
     create_exception,
     exceptions::{PyException, PyValueError},
@@ -41,12 +34,10 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("GridizeError", py.get_type::<GridizeError>())
 }
 
-pub fn scene(py: Python<'_>, error: &SceneFailure) -> PyErr {
-    let (path, place) = match error {
-        SceneFailure::Unreadable { path, .. } => (Some(path), None),
-        SceneFailure::Invalid(diagnostic) => (Some(&diagnostic.path), Some((diagnostic.line, diagnostic.column))),
-        _ => (None, None),
-    };
+/// A [`SceneError`].
+pub fn scene(py: Python<'_>, error: impl Into<Failure>) -> PyErr {
+    let error = error.into();
+    let (path, place) = error.location().map_or((None, None), |at| (Some(&at.path), at.line));
     let raised = SceneError::new_err(error.to_string());
     let value = raised.value(py);
     let told = value
@@ -56,20 +47,12 @@ pub fn scene(py: Python<'_>, error: &SceneFailure) -> PyErr {
     told.err().unwrap_or(raised)
 }
 
-pub fn dataset(py: Python<'_>, error: &dataset::Error) -> PyErr {
-    use dataset::Error::{Damaged, Foreign, Inconsistent, Memory, Occupied, Read, Version, Write};
-    let path = match error {
-        Read { path, .. }
-        | Memory { path, .. }
-        | Write { path, .. }
-        | Occupied { path }
-        | Foreign { path, .. }
-        | Version { path, .. }
-        | Damaged { path, .. }
-        | Inconsistent { path, .. } => Some(path.as_path()),
-        _ => None,
-    };
-    with_path(py, error.to_string(), path)
+/// A [`DatasetError`], or a [`SceneError`] where the scene in the dataset is not valid.
+pub fn dataset(py: Python<'_>, error: &Failure) -> PyErr {
+    match error.kind() {
+        ErrorKind::Scene => scene(py, error.clone()),
+        _ => with_path(py, error.to_string(), error.location().map(|at| at.path.as_path())),
+    }
 }
 
 /// A [`DatasetError`] about `path`.
@@ -78,30 +61,20 @@ fn with_path(py: Python<'_>, message: String, path: Option<&Path>) -> PyErr {
     raised.value(py).setattr("path", path).err().unwrap_or(raised)
 }
 
-pub fn setup(py: Python<'_>, error: &SetupError) -> PyErr {
-    match error {
-        SetupError::Scene(error) => scene(py, error),
-        error => with_path(py, error.to_string(), None),
-    }
-}
-
 /// The dataset has no `column`.
 pub fn absent(py: Python<'_>, column: &str) -> PyErr {
     with_path(py, format!("the dataset holds no {column}, as datasets of real objects do not"), None)
 }
 
-pub fn bake(error: &BakeFailure) -> PyErr {
+pub fn bake(error: &Failure) -> PyErr {
     BakeError::new_err(error.to_string())
 }
 
-pub fn gridize(error: &GridizeFailure) -> PyErr {
+pub fn gridize(error: &Failure) -> PyErr {
     GridizeError::new_err(error.to_string())
 }
 
-pub fn batch(error: BatchError) -> PyErr {
-    PyValueError::new_err(error.to_string())
-}
-
-pub fn direct(error: DirectError) -> PyErr {
+/// A wrong shape, or a number that is not finite.
+pub fn rows(error: Failure) -> PyErr {
     PyValueError::new_err(error.to_string())
 }

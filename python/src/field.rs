@@ -35,7 +35,7 @@ impl Field {
         let interpolation = interpolation.map(named).transpose()?;
         let data = &dataset.get().dataset;
         let field = threads::detach(py, || setup::field(data, interpolation))?;
-        Ok(Self { field: field.map_err(|error| errors::setup(py, &error))?, dataset })
+        Ok(Self { field: field.map_err(|error| errors::dataset(py, &error))?, dataset })
     }
 }
 
@@ -87,7 +87,7 @@ impl Field {
             return Ok(out.write(q.py(), &self.field.sample(&one).torque));
         }
         let configurations = Configurations::new(q, joints)?;
-        let look_up = |q: &[f64], out: &mut [f64]| self.field.torques(q, out, None).map_err(errors::batch);
+        let look_up = |q: &[f64], out: &mut [f64]| self.field.torques(q, out, None).map_err(errors::rows);
         Ok(configurations.fill(&[joints], out, look_up)?.into_any())
     }
 
@@ -95,7 +95,7 @@ impl Field {
     fn energy<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();
         Configurations::new(q, joints)?.fill(&[], None, |q, out: &mut [f64]| {
-            fill_rows(q, joints, out, |q, out| out[0] = self.field.sample(q).energy).map_err(errors::batch)
+            fill_rows(q, joints, out, |q, out| out[0] = self.field.sample(q).energy).map_err(errors::rows)
         })
     }
 
@@ -106,7 +106,7 @@ impl Field {
         let gap = self.dataset.get().dataset.gap.as_ref().ok_or_else(|| errors::absent(py, "gap"))?;
         Configurations::new(q, joints)?.fill(&[], None, |q, out: &mut [f64]| {
             let write = |q: &[f64], out: &mut [f64]| out[0] = self.field.grid().interpolate(gap, q);
-            fill_rows(q, joints, out, write).map_err(errors::batch)
+            fill_rows(q, joints, out, write).map_err(errors::rows)
         })
     }
 
@@ -115,7 +115,7 @@ impl Field {
     fn gradient<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();
         Configurations::new(q, joints)?.fill(&[joints, joints], None, |q, out: &mut [f64]| {
-            fill_rows(q, joints, out, |q, out| self.field.slope(q, out)).map_err(errors::batch)
+            fill_rows(q, joints, out, |q, out| self.field.slope(q, out)).map_err(errors::rows)
         })
     }
 
@@ -124,7 +124,7 @@ impl Field {
     fn status<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, u8>> {
         let joints = self.field.joints();
         Configurations::new(q, joints)?.fill(&[], None, |q, out: &mut [u8]| {
-            fill_rows(q, joints, out, |q, out| out[0] = self.field.sample(q).status() as u8).map_err(errors::batch)
+            fill_rows(q, joints, out, |q, out| out[0] = self.field.sample(q).status() as u8).map_err(errors::rows)
         })
     }
 

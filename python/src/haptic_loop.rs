@@ -1,10 +1,12 @@
 //! The passive haptic loop, driven tick by tick by the caller's own device.
 
-use crate::{arrays, dataset::Dataset, errors, threads};
+use crate::{arrays, background, dataset::Dataset, errors, scene::Scene, threads};
 use haptize::{
-    JointVector,
+    JointVector, dataset,
     render::{
-        haptic::{Haptics, Inputs, Output, State},
+        driven::DrivenLoop,
+        haptic::{Haptics, Inputs, Output},
+        live::LiveScene,
         setup::Setup,
     },
 };
@@ -14,12 +16,13 @@ use pyo3::{
     prelude::*,
     types::PyDict,
 };
-use std::sync::Arc;
+use std::sync::{Arc, atomic::AtomicBool};
 
 /// The haptic loop of a dataset's scene: the virtual proxy, its coupling to the device, the torque field, and the
-/// watchdog.
+/// watchdog. Or that of a scene for which nothing was baked: contact is then solved in every tick, before the surface at
+/// rest.
 ///
-/// Loop(dataset, gains=None): gains in the place of the scene's, a dict of what `[haptics]` names, one number for all
+/// Loop(source, gains=None): source is a Dataset or a Scene; gains in the place of the scene's, a dict of what `[haptics]` names, one number for all
 /// joints or one each: coupling_stiffness, coupling_damping, device_damping, proxy_damping, boundary_slope,
 /// torque_limit, torque_rate_limit, speed_limit.
 ///
@@ -29,17 +32,37 @@ use std::sync::Arc;
 pub struct Loop {
     haptics: Arc<Haptics>,
     warnings: Vec<String>,
-    state: Option<State>,
+    driven: Option<DrivenLoop>,
     last: Option<Output>,
+}
+
+/// The setup of a scene that is solved in every tick, and its dataset, in which nothing is stored.
+fn live(py: Python<'_>, scene: &Bound<'_, Scene>) -> PyResult<(Setup, dataset::Dataset, Option<&'static str>)> {
+    let scene = scene.get().scene.clone();
+    let build = move |_: &dyn Fn(())| LiveScene::new(scene);
+    let built = background::run(py, &AtomicBool::new(false), build, |()| Ok(()))?;
+    let scene = Arc::new(built.map_err(|error| errors::bake(&error))?);
+    let (dataset, notice) = (scene.dataset(), scene.notice());
+    let setup = threads::detach(py, || Setup::live(scene, &dataset))?.map_err(|error| errors::dataset(py, &error))?;
+    Ok((setup, dataset, notice))
 }
 
 #[pymethods]
 impl Loop {
     #[new]
-    #[pyo3(signature = (dataset, gains = None))]
-    fn new(py: Python<'_>, dataset: &Bound<'_, Dataset>, gains: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let dataset = &dataset.get().dataset;
-        let setup = threads::detach(py, || Setup::new(dataset))?.map_err(|error| errors::setup(py, &error))?;
+    #[pyo3(signature = (source, gains = None))]
+    fn new(py: Python<'_>, source: &Bound<'_, PyAny>, gains: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let (bare, notice);
+        let (setup, dataset) = if let Ok(scene) = source.cast::<Scene>() {
+            let setup;
+            (setup, bare, notice) = live(py, scene)?;
+            (setup, &bare)
+        } else {
+            notice = None;
+            let dataset = &source.cast::<Dataset>()?.get().dataset;
+            let setup = threads::detach(py, || Setup::new(dataset))?;
+            (setup.map_err(|error| errors::dataset(py, &error))?, dataset)
+        };
         let (haptics, advice) = match gains {
             None => (setup.haptics, setup.advice),
             Some(gains) => {
@@ -50,15 +73,16 @@ impl Loop {
                     spec.set_gain(&key, &values).map_err(|error| PyValueError::new_err(error.to_string()))?;
                 }
                 let retuned = threads::detach(py, || setup.retuned(dataset, &spec))?;
-                let retuned = retuned.map_err(|error| errors::setup(py, &error))?;
+                let retuned = retuned.map_err(|error| errors::dataset(py, &error))?;
                 (Arc::new(retuned.0), retuned.1)
             }
         };
-        let warnings = advice.into_iter().collect();
-        Ok(Self { haptics, warnings, state: None, last: None })
+        let warnings = notice.map(str::to_owned).into_iter().chain(advice).collect();
+        Ok(Self { haptics, warnings, driven: None, last: None })
     }
 
-    /// Gains beyond their passivity bounds, with values that would be passive; empty where all gains keep theirs.
+    /// Gains beyond their passivity bounds, with values that would be passive, and whether contact is solved otherwise
+    /// than the scene says; empty where all is as it should be.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.warnings.clone()
@@ -80,9 +104,9 @@ impl Loop {
     /// is under.
     fn start(&mut self, y: &Bound<'_, PyAny>) -> PyResult<()> {
         let position = arrays::vector("y", y, self.haptics.joints())?;
-        let started = match &mut self.state {
-            Some(state) => self.haptics.restart(state, &position),
-            None => self.haptics.start(&position).map(|state| self.state = Some(state)),
+        let started = match &mut self.driven {
+            Some(driven) => driven.restart(&position),
+            None => DrivenLoop::new(Arc::clone(&self.haptics), &position).map(|driven| self.driven = Some(driven)),
         };
         self.last = None;
         started.map_err(|fault| PyValueError::new_err(fault.to_string()))
@@ -105,9 +129,9 @@ impl Loop {
     ) -> PyResult<Bound<'py, PyAny>> {
         let joints = self.haptics.joints();
         let position = arrays::vector("y", y, joints)?;
-        let state = self.state.as_mut().ok_or_else(|| PyRuntimeError::new_err("call start before the first tick"))?;
+        let driven = self.driven.as_mut().ok_or_else(|| PyRuntimeError::new_err("call start before the first tick"))?;
         let out = arrays::Output::new(out, joints)?;
-        let output = self.haptics.tick(state, &Inputs { position, age, elapsed: dt, interval: dt });
+        let output = driven.tick(&Inputs { position, age, elapsed: dt, interval: dt });
         self.last = Some(output);
         Ok(out.write(py, &output.torque))
     }
@@ -115,7 +139,7 @@ impl Loop {
     /// Why the loop has let go and what to do about it; None where it has not.
     #[getter]
     fn fault(&self) -> Option<String> {
-        Some(self.state.as_ref()?.fault()?.to_string())
+        Some(self.driven.as_ref()?.fault()?.to_string())
     }
 
     /// Position of the virtual proxy at the last tick (rad; m); None before the first.

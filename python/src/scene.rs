@@ -31,14 +31,14 @@ impl Scene {
         } else {
             return Err(PyTypeError::new_err("a scene is made of a text or a dict"));
         };
-        let scene = scene::Scene::parse(&text, path).map_err(|error| errors::scene(py, &error))?;
+        let scene = scene::Scene::parse(&text, path).map_err(|error| errors::scene(py, error))?;
         Ok(Self { scene })
     }
 
     /// Read and check the scene file at `path`.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Ok(Self { scene: scene::Scene::load(path).map_err(|error| errors::scene(py, &error))? })
+        Ok(Self { scene: scene::Scene::load(path).map_err(|error| errors::scene(py, error))? })
     }
 
     /// For titles and lists.

@@ -26,6 +26,21 @@ def test_the_loop_pushes_back(dataset):
     assert loop.tick(PRESSED, loop.period, out=out) is out and out[1] < 0
 
 
+def test_a_scene_is_felt_without_a_bake(scene, dataset):
+    live, stored = haptize.Loop(scene), haptize.Loop(dataset)
+    assert live.joints == 2 and live.period == stored.period
+    felt, looked_up = press(live), press(stored)
+    assert live.contact and live.fault is None and felt[1] < 0
+    # The grid of the small scene is coarse.
+    assert 0 < abs(felt[1] - looked_up[1]) < 0.2 * abs(felt[1])
+    following = haptize.Scene(scene.text.replace("[contact]", '[contact]\nlaw = "following"'))
+    assert any("before the surface at rest" in warning for warning in haptize.Loop(following).warnings)
+    soft = haptize.Loop(scene, {"coupling_stiffness": np.array([1.0, 100.0])})
+    assert abs(press(soft)[1]) < abs(felt[1])
+    with pytest.raises(TypeError):
+        haptize.Loop("small.haptize")
+
+
 @pytest.mark.parametrize(
     "y, dt, age, words",
     [

@@ -43,8 +43,8 @@ pub struct Arguments {
     /// The backend that solves contact.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
-    /// The law of contact, instead of the scene's: depths and directions before the surface at rest or before the
-    /// deformed one, or the paper's iteration.
+    /// The law of contact, instead of the scene's: depths and directions before the surface at rest, or before
+    /// the deformed one.
     #[arg(long)]
     law: Option<ContactLaw>,
     /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     control::{CheckReport, PUSH_SHARE, Phase, check},
-    device::{Address, Coordinates, Finding, Guard, Key, Kind, LIMIT_SHARE, OpenError, Watchdog, open},
+    device::{Address, Coordinates, Finding, Guard, Key, Kind, LIMIT_SHARE, Watchdog, open},
     scene::Rendering,
 };
 use serde::Serialize;
@@ -112,8 +112,7 @@ fn examine(arguments: &Check) -> Result<Report, Failure> {
     let mut guard =
         Guard::new(hardware, arguments.push.then_some(key)).map_err(|halt| format!("{}: {halt}", arguments.device))?;
     if let Some(limit) = spec.and_then(|spec| spec.effort_limit) {
-        let device = guard.coordinates().count();
-        guard.limit_each(&limit).map_err(|given| OpenError::EffortLimit { given, device })?;
+        guard.limit_each(&limit)?;
     }
     let _keyboard = if arguments.push { Some(Keyboard::start(input)?) } else { None };
     tell(format_args!("haptize: {}", guard.description()));

@@ -8,8 +8,7 @@ use super::{
     watch,
 };
 use crate::{
-    MAX_JOINTS,
-    csv::TableError,
+    Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
         ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Samples, gridize, gridize_remembering,
@@ -296,8 +295,7 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
     let Some(log) = arguments.logs.first().filter(|log| is_mcap(log)) else {
         // A recording of another kind says what to do.
         for log in &arguments.logs {
-            let unreadable = |source| TableError::Read { file: log.clone(), source };
-            input::open(log).map_err(unreadable)?;
+            input::open(log).map_err(|source| Error::unreadable(log, &source))?;
         }
         return if topic.is_some() {
             Err("--topic is of MCAP files, and the first log is none".into())
@@ -306,11 +304,11 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
         };
     };
     let table = JointStateTable::open(log, topic)?;
-    if table.joints().len() > MAX_JOINTS {
+    if table.joints().len() > MAX_AXES {
         let names = table.joints().join(", ");
         let (file, many) = (log.display(), table.joints().len());
         return Err(format!(
-            "{file}: {} has {many} joints ({names}), more than {MAX_JOINTS}: choose some by a column mapping \
+            "{file}: {} has {many} joints ({names}), more than {MAX_AXES}: choose some by a column mapping \
              (--columns)",
             table.topic()
         )

@@ -7,9 +7,9 @@ use super::{
     tell,
 };
 use crate::{
-    JointVector,
+    ErrorKind, JointVector,
     contact::{Model, NodeForce},
-    dataset::{self, Dataset},
+    dataset::Dataset,
     field::TorqueField,
     object::{LatticeError, Object},
     proxy::Chain,
@@ -181,7 +181,7 @@ impl Stored {
 fn read(path: &Path) -> Result<(Scene, Object, Option<Dataset>), Failure> {
     let dataset = match Dataset::open(path) {
         Ok(dataset) => dataset,
-        Err(dataset::Error::Foreign { .. }) => {
+        Err(error) if error.kind() == ErrorKind::Foreign => {
             let scene = Scene::load(path)?;
             let object = build_object(&scene)?;
             return Ok((scene, object, None));

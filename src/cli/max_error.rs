@@ -8,8 +8,9 @@ use super::{
     tell, watch,
 };
 use crate::{
+    Error,
     scene::Scene,
-    sweep::{Aim, BackendChoice, Bake, Choice, Pilot, PilotError},
+    sweep::{Aim, BackendChoice, Bake, Choice, Pilot},
 };
 use serde::Serialize;
 use std::path::Path;
@@ -66,7 +67,7 @@ pub fn run(
         let aim = Some(pilot.relative);
         let bake = Bake { scene: &choice.scene, measured: Some(MEASURED), aim, progress: &mut *bake.progress, ..bake };
         let sweep = bake.to_file(goal.output, goal.resume)?;
-        Ok::<_, PilotError>((pilot, choice, sweep))
+        Ok::<_, Error>((pilot, choice, sweep))
     })?;
     let kept = sweep.error.as_ref().is_some_and(|error| error.keeps(pilot.relative));
     let baked = Baked::new(sweep, goal.output, Some(pilot.relative), replaced)?;

@@ -9,7 +9,7 @@ use super::{
     report::{Describe, Report, Text},
     tell, watch,
 };
-use crate::sweep::{Merge, MergeError, Merged, Progress, Sweep, ranges};
+use crate::sweep::{Merge, Merged, Progress, Sweep, ranges};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -95,8 +95,8 @@ impl Describe for MissingShards {
 
 /// Returns the report of missing shards.
 fn lacking(merge: &Merge, missing: &[usize]) -> Result<Report, Failure> {
+    let error = merge.lacks(missing).to_string();
     let (missing, shards) = (ranges(missing), merge.count());
-    let error = MergeError::Missing { missing: missing.clone(), count: shards }.to_string();
     tell(format_args!("haptize: {error}"));
     tell(format_args!("haptize: with Slurm: sbatch --array={missing} ... --shard auto/{shards}"));
     Report::of(&MissingShards { missing, shards, error }, false)

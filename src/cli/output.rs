@@ -151,14 +151,13 @@ pub fn replaceable(output: &Path) -> Result<Option<(PathBuf, fs::Metadata)>, Fai
     Ok(Some((file, there)))
 }
 
-/// Adds `tables` to the file of `scene`, and returns its name.
+/// Writes `text` in the place of the file of `scene`, and returns the file's name.
 ///
 /// # Errors
-/// When the scene would not be valid with them, or cannot be written.
-pub fn append(scene: &Scene, tables: &str) -> Result<String, Failure> {
-    let whole = format!("{}\n\n{tables}", scene.text.trim_end());
-    Scene::parse(&whole, &scene.path)?;
-    replace_file(&scene.path, |file| file.write_all(whole.as_bytes()))?;
+/// When that makes no valid scene, or cannot be written.
+pub fn rewrite(scene: &Scene, text: &str) -> Result<String, Failure> {
+    Scene::parse(text, &scene.path)?;
+    replace_file(&scene.path, |file| file.write_all(text.as_bytes()))?;
     Ok(scene.path.display().to_string())
 }
 

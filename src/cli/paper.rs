@@ -16,6 +16,7 @@ use crate::{
     dataset::{Dataset, replace_file},
     draw::canvas::Canvas,
     gridize::{GridizeOptions, Interpolation},
+    paper::{Comparison, Scanned, Scans, Sphere, haptize, procedure, specimen},
     render::{
         setup::Setup,
         trace::{Summary, Trace},
@@ -24,9 +25,7 @@ use crate::{
         self as figures,
         force::{EndForce, force},
         gridized::gridized,
-        object,
-        paper::{Comparison, Scanned, Scans, Sphere, procedure, specimen},
-        press,
+        object, press,
         slices::slices,
         space::space,
     },
@@ -114,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         .map_err(|error| format!("cannot make the folder {}: {error}; give another by -o", folder.display()))?;
     let scene = Scene::parse(SPHERE, "datasets/paper.toml")?;
     tell(format_args!("section 4.1: haptizing and pressing the sphere ..."));
-    let (dataset, sweep) = watch::watched(&scene, BackendChoice::Auto, |bake| bake.in_memory())?;
+    let (dataset, sweep) = watch::watched(&scene, BackendChoice::Cpu, haptize)?;
     dataset.save(&folder.join("paper.haptize"))?;
     let (setup, pressed) = felt(&dataset, "press")?;
     let (_, scraped) = felt(&dataset, "scrape")?;

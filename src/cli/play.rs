@@ -243,7 +243,7 @@ impl Describe for PlayedSession {
                 text.row("device", format_args!("without torque for {ticks} ticks: {reason}"));
             }
             if let Some(reason) = &tally.stopped {
-                text.row("device", format_args!("stopped for good: {reason}; play again to open it anew"));
+                text.row("device", format_args!("stopped for good: {reason}; run play again to open it"));
             }
         }
         self.timing.describe(text);
@@ -378,8 +378,7 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
 
 /// The scene at `path`, prepared to be solved live; none where `path` is no scene.
 fn live(path: &Path) -> Result<Option<Arc<LiveScene>>, Failure> {
-    let is_scene = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
-    Ok(if is_scene { Some(Arc::new(LiveScene::new(Scene::load(path)?)?)) } else { None })
+    Ok(if Scene::is_at(path) { Some(Arc::new(LiveScene::new(Scene::load(path)?)?)) } else { None })
 }
 
 /// Returns which of the files that a session writes are there already.

@@ -6,7 +6,7 @@ use super::{
     tell, watch,
 };
 use crate::{
-    scene::Scene,
+    scene::{Scene, SceneText},
     sweep::{Aim, BackendChoice, Cost, JointReach, Pilot, Reach},
 };
 use serde::Serialize;
@@ -21,7 +21,7 @@ use std::{
 Examples:
   haptize reach arm.toml
   haptize reach arm.toml --depth 0.008                only contact up to 8 mm deep
-  haptize reach arm.toml --max-error 2% --write       adds the grid to the scene")]
+  haptize reach arm.toml --max-error 2% --write       writes the grid into the scene")]
 pub struct Arguments {
     /// The scene. Its grid, if it has one, does not matter.
     scene: PathBuf,
@@ -38,7 +38,7 @@ pub struct Arguments {
     /// The backend that solves the pilot.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
-    /// Add the grid to the scene, which must not have one.
+    /// Write the grid into the scene, in the place of one that is there. Comments stay.
     #[arg(long)]
     write: bool,
 }
@@ -62,10 +62,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let scene = Scene::load(&arguments.scene)?;
     if arguments.write {
         output::replaceable(&arguments.scene)?;
-        if !scene.grid.axes.is_empty() {
-            let why = "has a [grid] already; delete that first, or leave out --write and copy what is printed";
-            return Err(format!("{}: {why}", arguments.scene.display()).into());
-        }
     }
     let stop = interrupt::stop_flag();
     let found = find(&scene, arguments, stop);
@@ -75,7 +71,14 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         Ok(grid) => (Some(grid), None),
         Err(refusal) => (None, Some(refusal)),
     };
-    let written = grid.as_deref().filter(|_| arguments.write).map(|grid| output::append(&scene, grid)).transpose()?;
+    let written = match grid.as_deref().filter(|_| arguments.write) {
+        None => None,
+        Some(grid) => {
+            let mut text = SceneText::new(&scene.text, &scene.path)?;
+            text.replace(grid)?;
+            Some(output::rewrite(&scene, &text.to_string())?)
+        }
+    };
     let scene = arguments.scene.display().to_string();
     let reached = Reached { reach, pilot, costs, grid, refusal, written, scene };
     Report::of(&reached, reached.refusal.is_none())
@@ -94,7 +97,7 @@ struct Reached {
     /// Why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
-    /// The scene to which it was added.
+    /// The scene into which it was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     written: Option<String>,
     #[serde(skip)]
@@ -204,6 +207,6 @@ impl Describe for Reached {
         for found in self.grid.iter().chain(&self.refusal) {
             text.line(format_args!("\n{}", found.trim_end()));
         }
-        self.written.iter().for_each(|scene| text.row("added to", scene));
+        self.written.iter().for_each(|scene| text.row("written to", scene));
     }
 }

@@ -15,7 +15,7 @@ use crate::{
     scene::Scene,
     store::Store,
     sweep::{
-        Aim, BackendChoice, ChosenBackend, CpuBackend, Lowered, build_object, check_law, grid_of,
+        Aim, BackendChoice, ChosenBackend, CpuBackend, Lowered, build_object, grid_of,
         refine::{Judge, Refine},
         sample,
     },
@@ -107,7 +107,6 @@ pub fn run(
     replaced: Option<Replaced>,
 ) -> Result<Report, Failure> {
     let began = Instant::now();
-    check_law(scene)?;
     let aim = goal.aim.checked(scene)?;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);

@@ -33,6 +33,11 @@ pub trait Backend {
         Ok(())
     }
 
+    /// Returns the number of threads that solve a chunk: one that is to leave none idle has a share for each.
+    fn threads(&self) -> usize {
+        rayon::current_num_threads()
+    }
+
     /// Returns what a user of the results should know of the time since the last call, each a sentence without its full
     /// stop. It holds from the first configuration of the last batch on, and goes into the dataset's provenance.
     fn notices(&mut self) -> Vec<String> {

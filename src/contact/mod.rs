@@ -19,7 +19,8 @@ mod mesh_ripple;
 mod model;
 mod node_tree;
 mod proximity;
-mod reach;
+pub(crate) mod reach;
+pub(crate) mod reactions;
 mod slip;
 mod solver;
 mod solvers;
@@ -83,7 +84,7 @@ impl Status {
 pub struct Equilibrium {
     /// How it ended.
     pub status: Status,
-    /// Steps tried (`energy`), passes (`paper`), or systems solved (`rest`).
+    /// Steps tried (`following`), systems solved (`rest`), or passes (the paper's iteration).
     pub iterations: u32,
     /// Relative residual of the force balance, in the energy norm; with `rest` the greatest depth that the forces do
     /// not account for, over the greatest at rest; one where nothing could be computed (1). In contact so stiff that
@@ -95,8 +96,8 @@ pub struct Equilibrium {
     pub gap: f64,
     /// Contact torque on the proxy, tau = sum_i J_i^T (force on x_i) (N m).
     pub torque: JointVector,
-    /// Tangent d tau/d q (N m/rad), where the model asks for it ([`Model::with_tangent`]), the algorithm is `energy` or
-    /// `rest`, and the equilibrium is a converged, strict minimum.
+    /// Tangent d tau/d q (N m/rad), where the model asks for it ([`Model::with_tangent`]), and the equilibrium is
+    /// a converged, strict minimum.
     pub tangent: Option<JointMatrix>,
     /// How the arm slides on its contacts, where the model asks for it ([`Model::with_slip`]) and something touches.
     pub slip: Option<Slip>,
@@ -122,6 +123,21 @@ impl Equilibrium {
             slip: None,
             touches: Vec::new(),
         }
+    }
+
+    /// No result: nothing is known to be balanced.
+    pub(crate) fn unknown(joints: usize) -> Self {
+        Self { status: Status::Unconverged, residual: 1.0, ..Self::free(0.0, joints) }
+    }
+
+    /// Whether every number is finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let carried = |touch: &Touch| touch.carriers.iter().all(|(_, weight)| weight.is_finite());
+        self.energy.is_finite()
+            && self.residual.is_finite()
+            && self.torque.is_finite()
+            && self.forces.iter().all(|force| force.force.is_finite())
+            && self.touches.iter().all(|touch| touch.force.is_finite() && carried(touch))
     }
 
     /// Returns the nodes of the proxy that are touched, ascending, and the force on each (N).

@@ -26,7 +26,7 @@ pub struct Model<'a> {
     /// the normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// `RIGID_STIFFNESS` (N/m).
     pub kc: f64,
-    /// Stiffness of each proxy node's spring over kc, in the algorithms but `paper`, whose springs are all alike: more
+    /// Stiffness of each proxy node's spring over kc, in the laws; the paper's iteration has springs all alike: more
     /// than one where the node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] (1).
     pub shares: Vec<f64>,
     /// Whether each equilibrium comes with its tangent d tau/d q.
@@ -85,7 +85,7 @@ impl<'a> Model<'a> {
             shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
             with_tangent: false,
             with_slip: false,
-            surface: Arc::new(RestSurface::new(object, contact.felt_surface())),
+            surface: Arc::new(RestSurface::new(object, contact.surface)),
         };
         model.measure_compliance();
         model
@@ -111,8 +111,8 @@ impl<'a> Model<'a> {
     pub fn with_contact(&self, contact: ContactSpec) -> Self {
         let shares = self.chain.nodes.iter().map(|node| contact.share(node.length)).collect();
         let mut model = Self { contact, shares, ..self.clone() };
-        if contact.felt_surface() != self.contact.felt_surface() {
-            model.surface = Arc::new(RestSurface::new(self.object, contact.felt_surface()));
+        if contact.surface != self.contact.surface {
+            model.surface = Arc::new(RestSurface::new(self.object, contact.surface));
         }
         model.measure_compliance();
         model

@@ -9,8 +9,9 @@
 use super::Proximity;
 use super::detection::Detection;
 use super::model::Model;
+use crate::Error;
 use crate::JointVector;
-use crate::object::{Compliance, Object, ObjectError};
+use crate::object::{Compliance, Object};
 use crate::proxy::Chain;
 use crate::scene::ContactSpec;
 use rayon::prelude::*;
@@ -35,7 +36,7 @@ impl<'a> Model<'a> {
         chain: &'a Chain,
         contact: ContactSpec,
         configurations: &[JointVector],
-    ) -> Result<Self, ObjectError> {
+    ) -> Result<Self, Error> {
         if object.surface_nodes <= Self::WHOLE {
             return Ok(Self::new(object, chain, contact));
         }
@@ -96,7 +97,7 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
 
 /// Whether the compliance covers all that a result depends on whose forces are on the object's nodes `loaded` and on the
 /// proxy's nodes `touching`, where no point of the surface has moved by more than `moved` (m).
-pub(super) fn covers(
+pub(crate) fn covers(
     model: &Model<'_>,
     detection: &Detection,
     mut loaded: impl Iterator<Item = u32>,

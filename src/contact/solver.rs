@@ -2,13 +2,11 @@
 
 use super::detection::Detection;
 use super::equilibrium::energy::{EnergySearch, SolverStats, StoppingCriteria};
-use super::equilibrium::paper::PaperIteration;
 use super::equilibrium::rest::{Guess, RestProgram};
-use super::linear::support::dot;
 use super::model::Model;
 use super::reach;
+use super::reactions::Reactions;
 use super::{Equilibrium, NodeForce, Slip, Status, Touch};
-use crate::contact::MINIMUM_SQUARE;
 use crate::proxy::Pose;
 use crate::scene::ContactLaw;
 use glam::DVec3;
@@ -21,16 +19,12 @@ pub struct Solver<'a> {
     pose: Pose,
     detection: Detection,
     energy: EnergySearch,
-    paper: PaperIteration,
     rest: RestProgram,
     /// Search that holds the displacement of the last configuration.
     held_by: HeldBy,
     /// That displacement, where it was asked for (m).
     displacement: Option<Vec<f64>>,
-    /// Sum of the forces on each surface node (N), and whether it is among `touched`.
-    node_forces: Vec<DVec3>,
-    marked: Vec<bool>,
-    touched: Vec<u32>,
+    reactions: Reactions,
 }
 
 /// Which forces hold a displacement.
@@ -38,7 +32,6 @@ pub struct Solver<'a> {
 enum HeldBy {
     Nothing,
     Energy,
-    Paper,
     Rest,
 }
 
@@ -46,19 +39,15 @@ impl<'a> Solver<'a> {
     /// A solver for `model`.
     #[must_use]
     pub fn new(model: &'a Model<'a>) -> Self {
-        let surface_nodes = model.surface.positions.len();
         Self {
             model,
             pose: model.chain.new_pose(),
             detection: Detection::new(model),
             energy: EnergySearch::new(model),
-            paper: PaperIteration::new(model),
             rest: RestProgram::new(model),
             held_by: HeldBy::Nothing,
             displacement: None,
-            node_forces: vec![DVec3::ZERO; surface_nodes],
-            marked: vec![false; surface_nodes],
-            touched: Vec::new(),
+            reactions: Reactions::new(model),
         }
     }
 
@@ -70,7 +59,6 @@ impl<'a> Solver<'a> {
     pub fn solve(&mut self, q: &[f64]) -> Equilibrium {
         self.find(q, |solver, equilibrium| match solver.model.contact.law {
             ContactLaw::Following => solver.minimise(None, equilibrium),
-            ContactLaw::Paper => solver.iterate(equilibrium),
             ContactLaw::Rest => solver.maximise(equilibrium),
         })
     }
@@ -106,12 +94,12 @@ impl<'a> Solver<'a> {
         (self.held_by, self.displacement) = (HeldBy::Nothing, None);
         let joints = model.chain.joints.len();
         if q.len() != joints || !q.iter().all(|x| x.is_finite()) {
-            return unknown(joints);
+            return Equilibrium::unknown(joints);
         }
         model.chain.pose(q, &mut self.pose);
         let gap = self.set_configuration();
         if !gap.is_finite() {
-            return unknown(joints);
+            return Equilibrium::unknown(joints);
         }
         let mut equilibrium = Equilibrium::free(gap, joints);
         if gap >= 0.0 {
@@ -121,23 +109,23 @@ impl<'a> Solver<'a> {
         equilibrium.iterations = outcome.iterations;
         equilibrium.residual = outcome.residual;
         equilibrium.status = if outcome.converged { Status::Contact } else { Status::Unconverged };
-        self.account(&mut equilibrium);
+        self.reactions.account(model, &self.pose, &mut equilibrium);
         equilibrium.slip = model.with_slip.then(|| Slip::of(model.chain, q, equilibrium.on_proxy()));
         if model.with_tangent && outcome.converged {
             equilibrium.tangent = match self.held_by {
                 HeldBy::Energy => self.energy.tangent(model, &self.pose),
                 HeldBy::Rest => Some(self.rest.tangent(model, &mut self.detection, &self.pose)),
-                HeldBy::Nothing | HeldBy::Paper => None,
+                HeldBy::Nothing => None,
             };
         }
-        if is_finite(&equilibrium) {
+        if equilibrium.is_finite() {
             if !self.is_covered(&equilibrium) {
                 equilibrium.status = Status::Overflow;
             }
             return equilibrium;
         }
         self.held_by = HeldBy::Nothing;
-        Equilibrium { gap, iterations: outcome.iterations, ..unknown(joints) }
+        Equilibrium { gap, iterations: outcome.iterations, ..Equilibrium::unknown(joints) }
     }
 
     /// Whether the compliance covers all that `equilibrium` depends on, where the surface has moved by at most `moved`
@@ -154,7 +142,7 @@ impl<'a> Solver<'a> {
         let elastic = match self.held_by {
             HeldBy::Energy => Some(self.energy.state.elastic),
             HeldBy::Rest => Some(self.rest.elastic),
-            HeldBy::Nothing | HeldBy::Paper => None,
+            HeldBy::Nothing => None,
         };
         model.compliance.is_whole()
             || elastic.is_some_and(|elastic| self.covers_within(equilibrium, model.motion_bound(elastic).moved))
@@ -184,7 +172,7 @@ impl<'a> Solver<'a> {
     /// Displacement u of the surface nodes at the last configuration solved, three numbers a node (m).
     #[must_use]
     pub fn displacement(&mut self) -> &[f64] {
-        let Self { model, energy, paper, rest, held_by, displacement, .. } = self;
+        let Self { model, energy, rest, held_by, displacement, .. } = self;
         displacement.get_or_insert_with(|| {
             let mut displacement = vec![0.0; 3 * model.surface.positions.len()];
             match held_by {
@@ -192,7 +180,6 @@ impl<'a> Solver<'a> {
                 HeldBy::Energy => {
                     energy.support.displace(&model.compliance, &energy.state.forces, &mut displacement);
                 }
-                HeldBy::Paper => displacement.copy_from_slice(&paper.displacement),
                 HeldBy::Rest => rest.support.displace(&model.compliance, &rest.forces, &mut displacement),
             }
             displacement
@@ -231,104 +218,23 @@ impl<'a> Solver<'a> {
             carriers: contact.carriers.iter().collect(),
             force: contact.normal * (self.model.kc * contact.force_over_kc()),
         }));
-        for touch in &equilibrium.touches {
-            let Self { node_forces, marked, touched, .. } = self;
-            push_back(node_forces, marked, touched, &touch.carriers, touch.force);
-        }
+        equilibrium.touches.iter().for_each(|touch| self.reactions.push_back(&touch.carriers, touch.force));
         outcome
     }
 
     /// Contact with the surface at rest: touches and U. The sideways part of the force on the proxy, which comes of how
     /// rows change along the surface, does not push back on the object.
     fn maximise(&mut self, equilibrium: &mut Equilibrium) -> SolverStats {
-        let Self { model, detection, rest, node_forces, marked, touched, .. } = self;
+        let Self { model, detection, rest, reactions, .. } = self;
         let outcome = rest.solve(model, detection, Guess::Depths).unwrap_or_default();
         self.held_by = HeldBy::Rest;
         equilibrium.energy = rest.energy;
         for (i, row) in rest.rows.iter().enumerate().filter(|(_, row)| row.multiplier > 0.0) {
             let carriers: Vec<(u32, f64)> = row.carriers.iter().collect();
-            push_back(node_forces, marked, touched, &carriers, row.normal * row.multiplier);
+            reactions.push_back(&carriers, row.normal * row.multiplier);
             equilibrium.touches.push(Touch { proxy_node: row.proxy_node, carriers, force: rest.force(i) });
         }
         equilibrium.touches.sort_unstable_by_key(|touch| touch.proxy_node);
         outcome
     }
-
-    /// The paper's iteration: touches, displacement and U.
-    ///
-    /// Its three forces on the nodes of a tie need not be parallel; the weights of a touch are their shares along the
-    /// whole.
-    fn iterate(&mut self, equilibrium: &mut Equilibrium) -> SolverStats {
-        let outcome = self.paper.iterate(self.model, &mut self.detection);
-        self.held_by = HeldBy::Paper;
-        for (slot, &node) in self.paper.support.nodes().iter().enumerate() {
-            let at = 3 * node as usize;
-            let forces = &self.paper.forces[3 * slot..3 * slot + 3];
-            equilibrium.energy += 0.5 * dot(forces, &self.paper.displacement[at..at + 3]);
-        }
-        for tie in &self.paper.ties {
-            let force = -(tie.forces[0] + tie.forces[1] + tie.forces[2]);
-            if force == DVec3::ZERO {
-                continue;
-            }
-            let square = force.length_squared().max(MINIMUM_SQUARE);
-            let weights = tie.forces.map(|part| -part.dot(force) / square);
-            let carriers = tie.nodes.into_iter().zip(weights).collect();
-            equilibrium.touches.push(Touch { proxy_node: tie.proxy_node, carriers, force });
-            for (part, node) in tie.forces.into_iter().zip(tie.nodes) {
-                // A spring Kc stretched to this force stores |f|^2 / (2 Kc).
-                equilibrium.energy += part.length_squared() / (2.0 * self.model.contact.stiffness);
-                if part != DVec3::ZERO {
-                    push(&mut self.node_forces, &mut self.marked, &mut self.touched, node, part);
-                }
-            }
-        }
-        outcome
-    }
-
-    /// Torque from the touches, and the forces on the object's nodes, ascending.
-    fn account(&mut self, equilibrium: &mut Equilibrium) {
-        for touch in &equilibrium.touches {
-            self.model.chain.add_torque(&self.pose, touch.proxy_node as usize, touch.force, &mut equilibrium.torque);
-        }
-        self.touched.sort_unstable();
-        for &node in &self.touched {
-            let force = std::mem::replace(&mut self.node_forces[node as usize], DVec3::ZERO);
-            self.marked[node as usize] = false;
-            equilibrium.forces.push(NodeForce { node, force });
-        }
-        self.touched.clear();
-    }
-}
-
-/// Adds the reaction to `force` on a proxy node to the forces on the nodes that carry it.
-fn push_back(sums: &mut [DVec3], marked: &mut [bool], touched: &mut Vec<u32>, carriers: &[(u32, f64)], force: DVec3) {
-    for &(node, weight) in carriers.iter().filter(|(_, weight)| *weight != 0.0) {
-        push(sums, marked, touched, node, -force * weight);
-    }
-}
-
-/// Adds `force` on `node`.
-fn push(sums: &mut [DVec3], marked: &mut [bool], touched: &mut Vec<u32>, node: u32, force: DVec3) {
-    if !std::mem::replace(&mut marked[node as usize], true) {
-        touched.push(node);
-    }
-    sums[node as usize] += force;
-}
-
-/// No result: nothing is known to be balanced.
-fn unknown(joints: usize) -> Equilibrium {
-    Equilibrium { status: Status::Unconverged, residual: 1.0, ..Equilibrium::free(0.0, joints) }
-}
-
-/// True when every number is finite.
-fn is_finite(equilibrium: &Equilibrium) -> bool {
-    equilibrium.energy.is_finite()
-        && equilibrium.residual.is_finite()
-        && equilibrium.torque.is_finite()
-        && equilibrium.forces.iter().all(|force| force.force.is_finite())
-        && equilibrium
-            .touches
-            .iter()
-            .all(|touch| touch.force.is_finite() && touch.carriers.iter().all(|(_, weight)| weight.is_finite()))
 }

@@ -4,9 +4,9 @@
 //! In the last phase each coordinate in turn is pushed by a sine of [`SWING`] Hz. If the device yields, the push does
 //! positive work where map and sign are right, which the report shows as `moves_along`.
 
-use super::{Clock, ClockError, ControlLoop, Controller, Patience};
+use super::{Clock, ControlLoop, Controller, Patience};
 use crate::{
-    JointVector,
+    Error, JointVector,
     device::{Applied, Device, Guard, Halt, Reading, Scheduler, Tally},
 };
 use serde::Serialize;
@@ -65,18 +65,6 @@ impl CheckReport {
         let moved = || self.pushed.iter().zip(&self.moves_along).all(|(pushed, work)| *pushed && *work >= 0.0);
         self.tally.stopped.is_none() && (self.phase != Phase::Push || moved())
     }
-}
-
-/// A phase cannot run.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CheckError {
-    /// The device refuses to switch its motors on.
-    #[error(transparent)]
-    Halt(#[from] Halt),
-    /// There is no clock for it.
-    #[error(transparent)]
-    Clock(#[from] ClockError),
 }
 
 /// A device in its own coordinates.
@@ -149,7 +137,7 @@ impl Controller for Check {
 ///
 /// # Errors
 /// When the device refuses to switch its motors on, or there is no memory.
-pub fn check(guard: &mut Guard, phase: Phase, seconds: f64, stop: &AtomicBool) -> Result<CheckReport, CheckError> {
+pub fn check(guard: &mut Guard, phase: Phase, seconds: f64, stop: &AtomicBool) -> Result<CheckReport, Error> {
     let count = guard.coordinates().count();
     if phase == Phase::ZeroTorque {
         guard.enable()?;

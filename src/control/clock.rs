@@ -8,7 +8,11 @@ use super::{
     real_time,
     timing::{Durations, Timing},
 };
-use crate::device::{Device, Scheduler};
+use crate::{
+    Error,
+    device::{Device, Scheduler},
+    error,
+};
 use std::{sync::Arc, thread, time::Duration};
 
 /// Relative difference of two rates of which one is the inverse of a period that is the inverse of the other (1): each
@@ -46,28 +50,6 @@ pub enum Patience {
     Sleeps,
     /// Nobody sees it. Ticks are done one behind the other when some of them are due, each at its deadline's time.
     Rests,
-}
-
-/// A session has no clock.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ClockError {
-    /// The device's own thread calls at another rate.
-    #[error(
-        "the device's own thread calls {device} times a second, and the scene's loop runs at {scene} Hz: set rate = \
-         {device} in {place}"
-    )]
-    Rate {
-        /// The device's (Hz).
-        device: f64,
-        /// The scene's (Hz).
-        scene: f64,
-        /// Where it is set.
-        place: &'static str,
-    },
-    /// There is no memory.
-    #[error("no memory for histograms: close other programs")]
-    Memory,
 }
 
 /// A tick that is due.
@@ -113,13 +95,8 @@ impl<'a> Clock<'a> {
     ///
     /// # Errors
     /// When that thread calls at another rate, or there is no memory.
-    pub fn of(
-        device: &dyn Device,
-        period: f64,
-        place: &'static str,
-        patience: Patient<'a>,
-    ) -> Result<Self, ClockError> {
-        let deadlines = Deadlines::new(period).ok_or(ClockError::Memory)?;
+    pub fn of(device: &dyn Device, period: f64, place: &'static str, patience: Patient<'a>) -> Result<Self, Error> {
+        let deadlines = Deadlines::new(period).ok_or("no memory for histograms: close other programs")?;
         let Some(scheduler) = device.scheduler() else { return Ok(Self::RealTime(deadlines, patience)) };
         check_rate(scheduler.as_ref(), period, place)?;
         Ok(Self::Scheduled(deadlines, scheduler, patience))
@@ -228,9 +205,15 @@ impl Deadlines {
 ///
 /// # Errors
 /// When it calls at another rate.
-pub fn check_rate(scheduler: &dyn Scheduler, period: f64, place: &'static str) -> Result<(), ClockError> {
+pub fn check_rate(scheduler: &dyn Scheduler, period: f64, place: &'static str) -> Result<(), Error> {
     let (device, scene) = (scheduler.rate(), 1.0 / period);
-    if (device - scene).abs() > SAME_RATE * scene { Err(ClockError::Rate { device, scene, place }) } else { Ok(()) }
+    if (device - scene).abs() > SAME_RATE * scene {
+        return Err(error!(
+            "the device's own thread calls {device} times a second, and the scene's loop runs at {scene} Hz: set rate \
+             = {device} in {place}"
+        ));
+    }
+    Ok(())
 }
 
 /// `count` periods. Unlike `Duration * u32` it does not run out within a session of some weeks.

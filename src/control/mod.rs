@@ -7,8 +7,8 @@ mod clock;
 pub(crate) mod real_time;
 pub mod timing;
 
-pub use check::{CheckError, CheckReport, PUSH_SHARE, Phase, check};
-pub use clock::{Clock, ClockError, LONGEST_ARREARS, Paced, Patience, check_rate};
+pub use check::{CheckReport, PUSH_SHARE, Phase, check};
+pub use clock::{Clock, LONGEST_ARREARS, Paced, Patience, check_rate};
 use timing::Timing;
 
 use crate::{

@@ -20,8 +20,12 @@
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
 use super::{
-    BUFFER, Dataset, Error, Grid, Provenance, Stored, Surface, Target, check, replace_file, store, stored::Description,
+    BUFFER, Dataset, Grid, Provenance, Stored, Surface, Target, check,
+    error::{inconsistent, unwritable},
+    replace_file, store,
+    stored::Description,
 };
+use crate::{Error, ErrorKind};
 use bytemuck::Pod;
 use rayon::prelude::*;
 use safetensors::{Dtype, tensor::TensorInfo};
@@ -174,17 +178,18 @@ pub(crate) fn may_be_dataset(start: &[u8]) -> bool {
 /// Checks that a dataset written to `path` replaces a dataset, an empty file, or none.
 ///
 /// # Errors
-/// [`Error::Occupied`] when a file of another kind is there, [`Error::Write`] when it cannot be read.
+/// When a file of another kind is there, or it cannot be read.
 pub(crate) fn check_place(path: &Path) -> Result<(), Error> {
     let mut start = Vec::new();
     if fs::metadata(path).is_ok_and(|there| there.is_file()) {
         // What cannot be read may be anything.
         File::open(path)
             .and_then(|file| file.take(PAGE as u64).read_to_end(&mut start))
-            .map_err(|source| Error::Write { path: path.into(), source })?;
+            .map_err(|source| unwritable(path, &source))?;
     }
     if !start.is_empty() && !may_be_dataset(&start) {
-        return Err(Error::Occupied { path: path.into() });
+        let what = "there is a file already that is not a dataset; nothing is written: name another file";
+        return Err(Error::at(path, what).of(ErrorKind::Foreign));
     }
     Ok(())
 }
@@ -193,12 +198,11 @@ impl Dataset {
     /// Writes the dataset, replacing the file `target` whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Inconsistent`] when it would be refused on reading, [`Error::Occupied`] when a file of another kind is
-    /// there, [`Error::Write`] from the system.
+    /// When it would be refused on reading, a file of another kind is there, or the system refuses.
     pub fn save<'a>(&self, target: impl Into<Target<'a>>) -> Result<(), Error> {
         let target = target.into();
         check_place(target.path())?;
-        check::check(self).map_err(|reason| Error::Inconsistent { path: target.path().into(), reason })?;
+        check::check(self).map_err(|reason| inconsistent(target.path(), reason))?;
         let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };
         if let Some(store) = &self.refinement {
             return store::file::save(store, heading, self.surface.as_ref(), target);
@@ -241,7 +245,7 @@ pub(crate) fn write_container<C: Contents>(
     mut tensors: Vec<Tensor<C>>,
 ) -> Result<(), Error> {
     let path = target.path();
-    let inconsistent = |reason| Error::Inconsistent { path: path.into(), reason };
+    let inconsistent = |reason: String| inconsistent(path, reason);
     tensors.sort_by_key(|tensor| std::cmp::Reverse(tensor.dtype.bitsize()));
     let mut text = header(kind, heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
     text.resize((LENGTH + text.len()).next_multiple_of(PAGE) - LENGTH, b' ');
@@ -263,7 +267,7 @@ pub(crate) fn write_container<C: Contents>(
         writer.seek(SeekFrom::Start(CHECKSUM as u64))?;
         writer.write_all(digits(hasher).as_bytes())
     })
-    .map_err(|source| Error::Write { path: path.into(), source })
+    .map_err(|source| unwritable(path, &source))
 }
 
 /// Writes `tensor` at `place` of `file`, its pieces on all cores, and returns its checksum.

@@ -30,7 +30,6 @@ pub(crate) use atomic::BUFFER;
 pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
 pub use claim::Claim;
 pub use column::Column;
-pub use error::Error;
 pub use export::Format;
 pub(crate) use file::{
     Contents as TensorContents, Heading, Kind, PIECE_BUFFER, Tensor, check_place, may_be_dataset, surface_tensors,

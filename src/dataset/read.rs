@@ -1,12 +1,13 @@
 //! Dataset files, read: mapped or copied, checked as a whole, and cut into columns where they lie.
 
 use super::{
-    CONTACTS, Column, Contacts, Dataset, Error, Grid, Provenance, SlipColumns, Solid, Stored, Surface, check,
+    CONTACTS, Column, Contacts, Dataset, Grid, Provenance, SlipColumns, Solid, Stored, Surface, check,
+    error::{damaged, foreign, no_memory},
     file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
     store,
 };
 use crate::{
-    input,
+    Error, ErrorKind, input,
     memory::{self, Shortage},
 };
 use memmap2::{Mmap, MmapMut};
@@ -26,7 +27,7 @@ impl Dataset {
     /// # Errors
     /// Missing, foreign, of another version, cut short, or altered in any bit.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        let read = |source| Error::Read { path: path.into(), source };
+        let read = |source| Error::unreadable(path, &source);
         let file = input::open(path).map_err(read)?;
         // SAFETY: the map is read-only and private to this process; what changing the file meanwhile does is said in
         // `file.rs`.
@@ -44,12 +45,12 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::open`]; also when it does not fit in memory.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let read = |source| Error::Read { path: path.into(), source };
+        let read = |source| Error::unreadable(path, &source);
         let mut file = input::open(path).map_err(read)?;
         let length = file.metadata().map_err(read)?.len();
         // A map of no bytes is refused by some systems; one zero byte is refused by the checks.
         let bytes = usize::try_from(length).map_err(|error| read(io::Error::other(error)))?;
-        memory::check(bytes).map_err(|shortage| Error::Memory { path: path.into(), shortage })?;
+        memory::check(bytes).map_err(|shortage| no_memory(path, shortage))?;
         let mut map = MmapMut::map_anon(bytes.max(1)).map_err(|_| no_room(path, &file))?;
         file.read_exact(&mut map[..bytes]).map_err(read)?;
         decode(path, map.make_read_only().map_err(read)?)
@@ -59,7 +60,7 @@ impl Dataset {
 /// The error of a file that does not fit in memory.
 fn no_room(path: &Path, file: &File) -> Error {
     let needed = file.metadata().map_or(0, |file| usize::try_from(file.len()).unwrap_or(usize::MAX));
-    Error::Memory { path: path.into(), shortage: Shortage { needed, left: memory::left().unwrap_or(0) } }
+    no_memory(path, Shortage { needed, left: memory::left().unwrap_or(0) })
 }
 
 /// A tensor that earlier versions stored for friction.
@@ -67,7 +68,7 @@ const TOUCHES: &str = "touch_offsets";
 
 /// Checks a whole file and makes a dataset of windows into it.
 fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
-    let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
+    let damaged = |reason: String| damaged(path, reason);
     let mut container = Container::check(path, map)?;
     if container.text("format").is_ok_and(|format| format == store::file::FORMAT) {
         let dataset = store::file::decode(path, container)?;
@@ -78,7 +79,9 @@ fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
     let scene = container.text("scene").map_err(damaged)?.to_string();
     let Container { windows, tensors, .. } = &mut container;
     if tensors.contains_key(TOUCHES) {
-        return Err(Error::Touches { path: path.into() });
+        let what = "holds contact forces on the arm's nodes, by which an earlier version felt friction and contact \
+                    damping; leave contact_damping out of its scene and bake it again";
+        return Err(Error::at(path, what).of(ErrorKind::Dataset));
     }
     let dataset = windows.dataset(tensors, grid, scene, provenance).map_err(damaged)?;
     container.finish().map_err(damaged)?;
@@ -97,11 +100,10 @@ pub(crate) struct Container {
 impl Container {
     /// Checks the whole file.
     fn check(path: &Path, map: Mmap) -> Result<Self, Error> {
-        let foreign = |reason: &str| Error::Foreign { path: path.into(), reason: reason.into() };
-        let damaged = |reason: String| Error::Damaged { path: path.into(), reason };
+        let damaged = |reason: String| damaged(path, reason);
 
         if map.get(LENGTH..CHECKSUM) != Some(OPENING) {
-            return Err(foreign("it begins otherwise"));
+            return Err(foreign(path, "it begins otherwise"));
         }
         let length = map.first_chunk::<LENGTH>().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let header = usize::try_from(length).unwrap_or(usize::MAX);
@@ -135,7 +137,8 @@ impl Container {
         };
         let found = container.text("format").map_err(damaged)?;
         if ![FORMAT, store::file::FORMAT].contains(&found) {
-            return Err(Error::Version { path: path.into(), found: found.into(), expected: FORMAT });
+            let what = format!("has format {found:?}, this program reads {FORMAT:?}; bake it again with this program");
+            return Err(Error::at(path, what).of(ErrorKind::Dataset));
         }
         Ok(container)
     }

@@ -2,7 +2,8 @@
 
 use super::{Column, Solid, Surface};
 use crate::{
-    object::{Body, Object, ObjectError},
+    Error,
+    object::{Body, Object},
     scene::ObjectSpec,
 };
 use glam::DVec3;
@@ -29,7 +30,7 @@ impl Surface {
     ///
     /// # Errors
     /// As for [`Object::from_body`].
-    pub fn object(&self, spec: &ObjectSpec) -> Result<Object, ObjectError> {
+    pub fn object(&self, spec: &ObjectSpec) -> Result<Object, Error> {
         let mut body = Body {
             nodes: self.nodes.chunks_exact(3).map(DVec3::from_slice).collect(),
             surface_nodes: self.nodes.len() / 3,

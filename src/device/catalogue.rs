@@ -1,13 +1,13 @@
 //! The kinds of devices, by the name that the command line gives them: `KIND` or `KIND:PLACE`.
 
 use super::{
-    Coordinates, Device, Guard, Halt, Hardware, Inverse3, JointDevice, Limits, LinearMap, MapError, Motion, Script,
-    Simulated, SimulatedHand, TipDevice, Watchdog,
+    Coordinates, Device, Guard, Hardware, Inverse3, JointDevice, Limits, LinearMap, Motion, Script, Simulated,
+    SimulatedHand, TipDevice, Watchdog,
     serial::{TwoDiy, Version, WoodenHaptics, ports},
     vendor::{ForceDimension, LibraryFiles, OpenHaptics},
 };
 use crate::{
-    JointVector,
+    Error, JointVector, error,
     proxy::Chain,
     scene::{DeviceSpec, HandSpec, Rendering, Waypoint},
 };
@@ -47,15 +47,6 @@ pub struct Address {
     pub place: Option<String>,
 }
 
-/// Text is no address of a device.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("\"{text}\" is no device: give one of {known}, or KIND:PLACE; \
- `haptize device list` shows what is there", known = known())]
-pub struct AddressError {
-    /// The text that was given.
-    pub text: String,
-}
-
 /// Devices of a kind that this machine has.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Finding {
@@ -63,62 +54,6 @@ pub struct Finding {
     pub places: Vec<String>,
     /// Missing parts, each with the remedy.
     pub missing: Vec<String>,
-}
-
-/// A device cannot be opened or does not fit the scene.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum OpenError {
-    /// The device is not there or refuses.
-    #[error("the device {device} cannot be opened: {what}")]
-    Device {
-        /// Its address.
-        device: String,
-        /// The defect, and the remedy.
-        what: String,
-    },
-    /// The device answers, but not as it should.
-    #[error("the device {device} cannot be used: {halt}")]
-    Halt {
-        /// Its address.
-        device: String,
-        /// Why.
-        halt: Halt,
-    },
-    /// Another number of joints.
-    #[error("the device has {device} joints and the scene's arm {scene}: take the device that the scene is for")]
-    Joints {
-        /// Joints of the device.
-        device: usize,
-        /// Joints of the scene.
-        scene: usize,
-    },
-    /// A scan controls joints.
-    #[error("the device measures where its tip is, not its joints: a scan needs a joint-true one")]
-    NoJoints,
-    /// A Cartesian device needs a node to lead.
-    #[error("the scene's arm has no contact node that the device's tip could lead: give it one")]
-    NoNode,
-    /// A joint-true device, whose joints are no one's guess.
-    #[error(
-        "the scene does not say how the joints of {device} drive its arm: give [device] a map, q = map * (coordinates \
-         of the device), with one row for each joint of the scene, or take a scene that has one"
-    )]
-    NoMap {
-        /// Its address.
-        device: String,
-    },
-    /// The scene's map does not fit.
-    #[error("[device] in the scene: {0}")]
-    Map(#[from] MapError),
-    /// The scene's limit does not fit.
-    #[error("[device] in the scene: effort_limit has {given} numbers for {device} coordinates of the device")]
-    EffortLimit {
-        /// Numbers that the scene gives.
-        given: usize,
-        /// Coordinates of the device.
-        device: usize,
-    },
 }
 
 impl Kind {
@@ -246,12 +181,17 @@ fn service() -> Finding {
 }
 
 impl FromStr for Address {
-    type Err = AddressError;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self, AddressError> {
+    fn from_str(text: &str) -> Result<Self, Error> {
         let (name, place) = text.split_once(':').map_or((text, None), |(name, place)| (name, Some(place)));
         let kind = Kind::ALL.into_iter().find(|kind| kind.name() == name);
-        let kind = kind.ok_or_else(|| AddressError { text: text.into() })?;
+        let kind = kind.ok_or_else(|| {
+            let known = known();
+            error!(
+                "\"{text}\" is no device: give one of {known}, or KIND:PLACE; `haptize device list` shows what is there"
+            )
+        })?;
         Ok(Self { kind, place: place.filter(|place| !place.is_empty()).map(str::to_owned) })
     }
 }
@@ -283,9 +223,9 @@ fn known() -> String {
 /// by the hand, or without a scene held at rest.
 ///
 /// # Errors
-/// [`OpenError::Device`] says what is missing and what to do.
-pub fn open(address: &Address, held: Option<(SimulatedHand, &DeviceSpec)>) -> Result<Box<dyn Hardware>, OpenError> {
-    let failed = |what: String| OpenError::Device { device: address.to_string(), what };
+/// Says what is missing and what to do.
+pub fn open(address: &Address, held: Option<(SimulatedHand, &DeviceSpec)>) -> Result<Box<dyn Hardware>, Error> {
+    let failed = |what: String| error!("the device {address} cannot be opened: {what}");
     let line = || match (&address.place, ports().as_slice()) {
         (Some(place), _) => Ok(place.clone()),
         (None, [port]) => Ok(port.clone()),
@@ -307,7 +247,7 @@ pub fn open(address: &Address, held: Option<(SimulatedHand, &DeviceSpec)>) -> Re
                 place.split(',').filter(|script| !script.is_empty()).map(str::parse).collect();
             let (hand, spec) = match held {
                 Some((hand, spec)) => (hand, Some(spec)),
-                None => (resting_hand().map_err(failed)?, None),
+                None => (resting_hand()?, None),
             };
             let joints = hand.joints();
             let map = match spec {
@@ -323,12 +263,12 @@ pub fn open(address: &Address, held: Option<(SimulatedHand, &DeviceSpec)>) -> Re
 }
 
 /// A hand that holds a device of three joints where it is.
-fn resting_hand() -> Result<SimulatedHand, String> {
+fn resting_hand() -> Result<SimulatedHand, Error> {
     let all = |x: f64| JointVector::from_slice(&[x; SIMULATED_JOINTS]);
     let motion = Motion::through(&[Waypoint { time: 0.0, q: all(0.0) }], SIMULATED_JOINTS);
     let hand = HandSpec { stiffness: all(20.0), damping: all(0.4), inertia: all(2e-3) };
     let held = motion.map(|motion| SimulatedHand::holding(&hand, &all(1e-3), &all(0.03), motion));
-    held.map_err(|error| error.to_string())?.map_err(|error| error.to_string())
+    held?
 }
 
 /// Joints of the simulated device where no scene says how many.
@@ -341,13 +281,13 @@ const SIMULATED_TORQUE: f64 = 1.5;
 /// motors on.
 ///
 /// # Errors
-/// [`OpenError`] if device and scene do not fit, or the device refuses.
-pub fn attach(guard: Guard, address: &Address, chain: Chain, scene: &Rendering) -> Result<Box<dyn Device>, OpenError> {
+/// When device and scene do not fit, or the device refuses.
+pub fn attach(guard: Guard, address: &Address, chain: Chain, scene: &Rendering) -> Result<Box<dyn Device>, Error> {
     if guard.coordinates() != Coordinates::Tip {
         return Ok(Box::new(attach_joints(guard, address, chain.degrees_of_freedom(), &scene.device)?));
     }
     if chain.nodes.is_empty() {
-        return Err(OpenError::NoNode);
+        return Err("the scene's arm has no contact node that the device's tip could lead: give it one".into());
     }
     let (guard, map) = mapped(guard, address, &scene.device)?;
     Ok(Box::new(TipDevice::new(guard, map, chain, &scene.device, &scene.haptics)))
@@ -356,40 +296,42 @@ pub fn attach(guard: Guard, address: &Address, chain: Chain, scene: &Rendering) 
 /// Makes of the joint-true device behind `guard` one of `joints` joints, as `spec` says, and switches its motors on.
 ///
 /// # Errors
-/// [`OpenError`] if the device is Cartesian, does not fit, or refuses.
-pub fn attach_joints(
-    guard: Guard,
-    address: &Address,
-    joints: usize,
-    spec: &DeviceSpec,
-) -> Result<JointDevice, OpenError> {
+/// When the device is Cartesian, does not fit, or refuses.
+pub fn attach_joints(guard: Guard, address: &Address, joints: usize, spec: &DeviceSpec) -> Result<JointDevice, Error> {
     match guard.coordinates() {
-        Coordinates::Tip => Err(OpenError::NoJoints),
-        Coordinates::Joints(device) if device != joints => Err(OpenError::Joints { device, scene: joints }),
+        Coordinates::Tip => {
+            Err("the device measures where its tip is, not its joints: a scan needs a joint-true one".into())
+        }
+        Coordinates::Joints(device) if device != joints => Err(error!(
+            "the device has {device} joints and the scene's arm {joints}: take the device that the scene is for"
+        )),
         Coordinates::Joints(_) => mapped(guard, address, spec).map(|(guard, map)| JointDevice::new(guard, map)),
     }
 }
 
 /// The map from the `coordinates` of the device at `address` to the scene's, as `spec` says.
-fn map(spec: &DeviceSpec, coordinates: Coordinates, address: &Address) -> Result<LinearMap, OpenError> {
+fn map(spec: &DeviceSpec, coordinates: Coordinates, address: &Address) -> Result<LinearMap, Error> {
     let count = coordinates.count();
     let offset = spec.offset.unwrap_or(JointVector::zeros(count));
+    let of_scene = |error: Error| error.within("[device] in the scene");
     Ok(match &spec.map {
-        Some(rows) => LinearMap::new(rows, &offset, count)?,
+        Some(rows) => LinearMap::new(rows, &offset, count).map_err(of_scene)?,
         None if coordinates != Coordinates::Tip && address.kind != Kind::Simulated => {
-            return Err(OpenError::NoMap { device: address.to_string() });
+            return Err(error!(
+                "the scene does not say how the joints of {address} drive its arm: give [device] a map, q = map * \
+                 (coordinates of the device), with one row for each joint of the scene, or take a scene that has one"
+            ));
         }
-        None => LinearMap::identity(count).moved(&offset)?,
+        None => LinearMap::identity(count).moved(&offset).map_err(of_scene)?,
     })
 }
 
 /// Limits the device as `spec` says, and switches its motors on; with the map to the scene's coordinates.
-fn mapped(mut guard: Guard, address: &Address, spec: &DeviceSpec) -> Result<(Guard, LinearMap), OpenError> {
-    let count = guard.coordinates().count();
+fn mapped(mut guard: Guard, address: &Address, spec: &DeviceSpec) -> Result<(Guard, LinearMap), Error> {
     if let Some(limit) = &spec.effort_limit {
-        guard.limit_each(limit).map_err(|given| OpenError::EffortLimit { given, device: count })?;
+        guard.limit_each(limit)?;
     }
     let map = map(spec, guard.coordinates(), address)?;
-    guard.enable().map_err(|halt| OpenError::Halt { device: address.to_string(), halt })?;
+    guard.enable().map_err(|halt| error!("the device {address} cannot be used: {halt}"))?;
     Ok((guard, map))
 }

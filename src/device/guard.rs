@@ -16,7 +16,7 @@
 use super::{
     Clamps, Coordinates, Halt, Hardware, Key, Limits, Measurement, Scheduler, halt::LONGEST_AGE, hardware::Command,
 };
-use crate::{JointVector, scene::GREATEST_INTERVAL};
+use crate::{Error, JointVector, error, scene::GREATEST_INTERVAL};
 use std::sync::{
     Arc,
     atomic::{AtomicBool, Ordering},
@@ -114,10 +114,13 @@ impl Guard {
     /// Lowers each clamp to `limits` (N m or N) where that is less.
     ///
     /// # Errors
-    /// Returns the length of `limits` if it is not the number of coordinates.
-    pub fn limit_each(&mut self, limits: &JointVector) -> Result<(), usize> {
-        if limits.len() != self.most.len() {
-            return Err(limits.len());
+    /// When there is not one for each coordinate.
+    pub fn limit_each(&mut self, limits: &JointVector) -> Result<(), Error> {
+        let (given, device) = (limits.len(), self.most.len());
+        if given != device {
+            return Err(error!(
+                "[device] in the scene: effort_limit has {given} numbers for {device} coordinates of the device"
+            ));
         }
         self.most.iter_mut().zip(limits.iter()).for_each(|(most, limit)| *most = most.min(limit.max(0.0)));
         Ok(())

@@ -1,5 +1,6 @@
 //! Why a device is without torque, and what was clamped on the way to it.
 
+use crate::Error;
 use serde::Serialize;
 
 /// Longest age of a measurement on which torque may rest (s). Longer: torque follows a hand that has moved on. Shorter:
@@ -51,6 +52,12 @@ impl Halt {
     #[must_use]
     pub fn is_final(self) -> bool {
         !matches!(self, Self::Stale | Self::KeyReleased | Self::NotReady)
+    }
+}
+
+impl From<Halt> for Error {
+    fn from(halt: Halt) -> Self {
+        Self::new(halt.to_string())
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::{Applied, Device, Motion, Reading};
 use crate::{
-    JointVector,
+    Error, JointVector, error,
     scene::{HandSpec, HapticsSpec},
 };
 
@@ -19,24 +19,9 @@ pub struct SimulatedHand {
     time: f64,
 }
 
-/// A hand cannot be simulated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum HandError {
-    /// The scene's haptics have another number of joints than what the hand is to follow.
-    #[error("the hand is told {told} joints and the haptic device has {device}")]
-    Joints {
-        /// Joints of the motion or the pointer.
-        told: usize,
-        /// Joints of the scene's device.
-        device: usize,
-    },
-    /// Hand and device have no inertia at a joint.
-    #[error("hand and device have no inertia at joint {0}: give the device or the hand a positive one")]
-    Inertia(usize),
-    /// The pointer receives an invalid place.
-    #[error("{0:?} is no place for a hand: its coordinates must be finite and within reach")]
-    Place(JointVector),
+/// The error of a hand that is told of `told` joints where its device has `device`.
+pub(super) fn other_joints(told: usize, device: usize) -> Error {
+    error!("the hand is told {told} joints and the haptic device has {device}")
 }
 
 impl SimulatedHand {
@@ -44,7 +29,7 @@ impl SimulatedHand {
     ///
     /// # Errors
     /// When the joints do not fit, or hand and device have no inertia.
-    pub fn new(spec: &HapticsSpec, motion: Motion) -> Result<Self, HandError> {
+    pub fn new(spec: &HapticsSpec, motion: Motion) -> Result<Self, Error> {
         Self::holding(&spec.hand, &spec.device_inertia, &spec.device_damping, motion)
     }
 
@@ -58,7 +43,7 @@ impl SimulatedHand {
         inertia: &JointVector,
         damping: &JointVector,
         motion: Motion,
-    ) -> Result<Self, HandError> {
+    ) -> Result<Self, Error> {
         let arm = Arm::holding(hand, inertia, damping, &motion.at(0.0).0)?;
         Ok(Self { motion, arm, time: 0.0 })
     }
@@ -101,7 +86,7 @@ pub(super) struct Arm {
 
 impl Arm {
     /// The hand and device of `spec`, at rest at `position`.
-    pub(super) fn new(spec: &HapticsSpec, position: &JointVector) -> Result<Self, HandError> {
+    pub(super) fn new(spec: &HapticsSpec, position: &JointVector) -> Result<Self, Error> {
         Self::holding(&spec.hand, &spec.device_inertia, &spec.device_damping, position)
     }
 
@@ -110,15 +95,17 @@ impl Arm {
         device_inertia: &JointVector,
         device_damping: &JointVector,
         position: &JointVector,
-    ) -> Result<Self, HandError> {
+    ) -> Result<Self, Error> {
         let mut inertia = *device_inertia;
         if position.len() != inertia.len() {
-            return Err(HandError::Joints { told: position.len(), device: inertia.len() });
+            return Err(other_joints(position.len(), inertia.len()));
         }
         for (a, (inertia, hand)) in inertia.iter_mut().zip(spec.inertia.iter()).enumerate() {
             *inertia += hand;
             if !inertia.is_finite() || *inertia <= 0.0 {
-                return Err(HandError::Inertia(a));
+                return Err(error!(
+                    "hand and device have no inertia at joint {a}: give the device or the hand a positive one"
+                ));
             }
         }
         let zero = JointVector::zeros(position.len());

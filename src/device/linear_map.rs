@@ -4,7 +4,7 @@
 //! The joints of a parallelogram are measured against the ground where a serial chain's are relative; the rows of A
 //! subtract them. For a Cartesian device q is a position in the scene (m) and A turns (and scales) the device's axes.
 
-use crate::{JointVector, MAX_JOINTS};
+use crate::{Error, JointVector, MAX_JOINTS, error};
 use faer::{Mat, linalg::solvers::DenseSolveCore};
 
 /// The map of a device, and its inverse.
@@ -17,21 +17,6 @@ pub struct LinearMap {
     inverse: [[f64; MAX_JOINTS]; MAX_JOINTS],
     /// b (rad or m).
     offset: JointVector,
-}
-
-/// A map cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MapError {
-    /// Rows or offset have another length than the device has coordinates.
-    #[error("map and offset must have {count} rows of {count} numbers, one for each coordinate of the device")]
-    Size {
-        /// Coordinates of the device.
-        count: usize,
-    },
-    /// A has no inverse.
-    #[error("the map has no inverse: several of its rows say the same, so that a torque has no motor to go to")]
-    Singular,
 }
 
 /// Largest deviation of A A^-1 from the identity (1): rounding of a well-conditioned matrix of order six stays a
@@ -50,18 +35,20 @@ impl LinearMap {
     /// Returns `q = A m + b` with the `rows` of A and `offset` b, for `count` coordinates.
     ///
     /// # Errors
-    /// [`MapError::Size`] if a length differs from `count`, [`MapError::Singular`] if A has no inverse or is not
-    /// finite.
-    pub fn new(rows: &[JointVector], offset: &JointVector, count: usize) -> Result<Self, MapError> {
+    /// When a length differs from `count`, or A has no inverse or is not finite.
+    pub fn new(rows: &[JointVector], offset: &JointVector, count: usize) -> Result<Self, Error> {
         if count > MAX_JOINTS || rows.len() != count || offset.len() != count || rows.iter().any(|r| r.len() != count) {
-            return Err(MapError::Size { count });
+            return Err(other_size(count));
         }
         let square = Mat::from_fn(count, count, |i, j| rows[i][j]);
         let inverted = square.partial_piv_lu().inverse();
         let product = &square * &inverted;
         let exact = |i: usize, j: usize| (product[(i, j)] - f64::from(u8::from(i == j))).abs() < INVERSE_ROUNDING;
         if !offset.is_finite() || !(0..count).all(|i| (0..count).all(|j| exact(i, j))) {
-            return Err(MapError::Singular);
+            return Err(
+                "the map has no inverse: several of its rows say the same, so that a torque has no motor to go to"
+                    .into(),
+            );
         }
         let mut map = Self { offset: *offset, ..Self::identity(count) };
         for i in 0..count {
@@ -75,13 +62,9 @@ impl LinearMap {
     /// Returns the same map with `offset` b.
     ///
     /// # Errors
-    /// [`MapError::Size`] if it has another length than the map.
-    pub fn moved(self, offset: &JointVector) -> Result<Self, MapError> {
-        if offset.len() == self.count {
-            Ok(Self { offset: *offset, ..self })
-        } else {
-            Err(MapError::Size { count: self.count })
-        }
+    /// When it has another length than the map.
+    pub fn moved(self, offset: &JointVector) -> Result<Self, Error> {
+        if offset.len() == self.count { Ok(Self { offset: *offset, ..self }) } else { Err(other_size(self.count)) }
     }
 
     /// Returns `A m + b` of a measured position.
@@ -125,6 +108,10 @@ impl LinearMap {
     }
 }
 
+fn other_size(count: usize) -> Error {
+    error!("map and offset must have {count} rows of {count} numbers, one for each coordinate of the device")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,11 +140,13 @@ mod tests {
 
     #[test]
     fn maps_without_an_inverse_or_of_another_size_are_refused() {
+        let refusal =
+            |rows: &[JointVector], count| LinearMap::new(rows, &vector(&[0.0; 2]), count).unwrap_err().to_string();
         let rows = [vector(&[1.0, 2.0]), vector(&[2.0, 4.0])];
-        assert_eq!(LinearMap::new(&rows, &vector(&[0.0; 2]), 2), Err(MapError::Singular));
+        assert!(refusal(&rows, 2).contains("no inverse"));
         let rows = [vector(&[1.0, f64::NAN]), vector(&[2.0, 4.0])];
-        assert_eq!(LinearMap::new(&rows, &vector(&[0.0; 2]), 2), Err(MapError::Singular));
-        assert_eq!(LinearMap::new(&rows, &vector(&[0.0; 2]), 3), Err(MapError::Size { count: 3 }));
+        assert!(refusal(&rows, 2).contains("no inverse"));
+        assert!(refusal(&rows, 3).contains("3 rows of 3 numbers"));
         assert_eq!(LinearMap::new(&[], &vector(&[]), 0), Ok(LinearMap::identity(0)));
     }
 }

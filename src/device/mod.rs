@@ -34,20 +34,20 @@ mod tally;
 mod tip;
 pub mod vendor;
 
-pub use catalogue::{Address, AddressError, Finding, Kind, OpenError, attach, attach_joints, open};
+pub use catalogue::{Address, Finding, Kind, attach, attach_joints, open};
 pub use guard::{Guard, Held, LIMIT_SHARE, RAMP_TIME, RISE_TIME, WARM_TIME};
 pub use halt::{Clamps, Halt, LONGEST_AGE};
 pub use hardware::{Command, Coordinates, Hardware, Limits, Measurement, Scheduler, Watchdog};
 pub use inverse3::{Inverse3, STALE_COMMAND};
 pub use joints::JointDevice;
 pub use key::{Key, KeyInput};
-pub use linear_map::{LinearMap, MapError};
+pub use linear_map::LinearMap;
 pub use simulated::{Failure, Script, Simulated};
 pub use tally::Tally;
 pub use tip::TipDevice;
 
-pub use hand::{HandError, SimulatedHand};
-pub use motion::{Motion, MotionError};
+pub use hand::SimulatedHand;
+pub use motion::Motion;
 pub use pointer::{Pointer, PointerInput};
 pub use recorded::Recorded;
 

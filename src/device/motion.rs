@@ -7,13 +7,14 @@
 //! one coordinate per joint.
 
 use crate::{
-    JointVector,
-    csv::{Lines, TableError, fields, plain},
+    Error, JointVector,
+    csv::{Lines, fields, plain},
     dataset::JointLabel,
+    error,
     input::GREATEST_INPUT,
     scene::{JointKind, JointSpec, Waypoint},
 };
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A motion; before its first and after its last waypoint it rests there.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,61 +22,6 @@ pub struct Motion {
     /// At least one; times ascend.
     waypoints: Vec<Waypoint>,
     smooth: bool,
-}
-
-/// A motion cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MotionError {
-    /// No waypoint at all.
-    #[error("the motion has no waypoints: give it at least one")]
-    Empty,
-    /// A file without a sample.
-    #[error("{}: holds no sample; each line gives a time in seconds and {joints} coordinates, separated by commas",
-        .file.display())]
-    NoSample {
-        /// The motion's file.
-        file: PathBuf,
-        /// Number of joints of the proxy.
-        joints: usize,
-    },
-    /// A waypoint's time does not come after the one before.
-    #[error("waypoint {waypoint} of the motion is at {time} s, not after the one before it")]
-    Time {
-        /// Number of the waypoint, from one.
-        waypoint: usize,
-        /// Its time (s).
-        time: f64,
-    },
-    /// A waypoint has another number of joints than the proxy, or a coordinate that is none.
-    #[error("waypoint {waypoint} of the motion is {q:?}; the proxy asks for {joints} finite coordinates")]
-    Waypoint {
-        /// Number of the waypoint, from one.
-        waypoint: usize,
-        /// The configuration that it gives.
-        q: JointVector,
-        /// Number of joints of the proxy.
-        joints: usize,
-    },
-    /// A position is beyond the limits of its joint.
-    #[error("at {time} s joint {joint} is at {position}, beyond its limits [{least}, {greatest}]{hint}")]
-    Limits {
-        /// When (s).
-        time: f64,
-        /// Name of the joint.
-        joint: String,
-        /// Its position (rad or m).
-        position: f64,
-        /// Its least position (rad or m).
-        least: f64,
-        /// Its greatest position (rad or m).
-        greatest: f64,
-        /// What may be the cause, in words, or nothing.
-        hint: &'static str,
-    },
-    /// The file cannot be read, or a line of it is not a sample.
-    #[error(transparent)]
-    File(#[from] TableError),
 }
 
 /// Largest file that is read (bytes): a day of six joints at 20 Hz, or an hour at 1 kHz.
@@ -86,7 +32,7 @@ impl Motion {
     ///
     /// # Errors
     /// When there are none, a time does not ascend, or a configuration does not fit.
-    pub fn through(waypoints: &[Waypoint], joints: usize) -> Result<Self, MotionError> {
+    pub fn through(waypoints: &[Waypoint], joints: usize) -> Result<Self, Error> {
         Self { waypoints: waypoints.to_vec(), smooth: true }.checked(joints)
     }
 
@@ -94,22 +40,29 @@ impl Motion {
     ///
     /// # Errors
     /// As [`Motion::through`].
-    pub fn along(samples: Vec<Waypoint>, joints: usize) -> Result<Self, MotionError> {
+    pub fn along(samples: Vec<Waypoint>, joints: usize) -> Result<Self, Error> {
         Self { waypoints: samples, smooth: false }.checked(joints)
     }
 
-    fn checked(self, joints: usize) -> Result<Self, MotionError> {
+    fn checked(self, joints: usize) -> Result<Self, Error> {
         let mut before = f64::NEG_INFINITY;
         for (k, point) in self.waypoints.iter().enumerate() {
             if !(point.time.is_finite() && point.time > before) {
-                return Err(MotionError::Time { waypoint: k + 1, time: point.time });
+                let (waypoint, time) = (k + 1, point.time);
+                return Err(error!("waypoint {waypoint} of the motion is at {time} s, not after the one before it"));
             }
             before = point.time;
             if point.q.len() != joints || !is_position(&point.q) {
-                return Err(MotionError::Waypoint { waypoint: k + 1, q: point.q, joints });
+                let (waypoint, q) = (k + 1, point.q);
+                return Err(error!(
+                    "waypoint {waypoint} of the motion is {q:?}; the proxy asks for {joints} finite coordinates"
+                ));
             }
         }
-        if self.waypoints.is_empty() { Err(MotionError::Empty) } else { Ok(self) }
+        if self.waypoints.is_empty() {
+            return Err("the motion has no waypoints: give it at least one".into());
+        }
+        Ok(self)
     }
 
     /// Returns the motion in the comma-separated `file`, of `joints` in their order. Empty lines and lines that begin
@@ -119,16 +72,14 @@ impl Motion {
     /// # Errors
     /// When the file cannot be read, its header does not name each joint once, or a line is not a sample; the error
     /// names file and line.
-    pub fn from_csv(file: &Path, labels: &[JointLabel]) -> Result<Self, MotionError> {
+    pub fn from_csv(file: &Path, labels: &[JointLabel]) -> Result<Self, Error> {
         let joints = labels.len();
+        let sample = format!("each line gives a time in seconds and {joints} coordinates, separated by commas");
         let mut lines = Lines::open(file, GREATEST_FILE, "not a motion")?;
         let (mut waypoints, mut line): (Vec<Waypoint>, _) = (Vec::new(), Vec::new());
         let mut columns: Option<Columns> = None;
         while let Some(text) = lines.next_text(&mut line)? {
-            let bad = |what| {
-                let sample = format!("each line gives a time in seconds and {joints} coordinates, separated by commas");
-                lines.error(format!("{what}; {sample}"))
-            };
+            let bad = |what| lines.error(format_args!("{what}; {sample}"));
             let text = text.trim();
             if text.is_empty() || text.starts_with(['#', '%']) {
                 continue;
@@ -144,12 +95,12 @@ impl Motion {
             };
             let point = columns.sample(text).map_err(bad)?;
             if waypoints.last().is_some_and(|last| last.time >= point.time) {
-                return Err(bad(format!("time {} s does not come after the line before", point.time)).into());
+                return Err(bad(format!("time {} s does not come after the line before", point.time)));
             }
             waypoints.push(point);
         }
         if waypoints.is_empty() {
-            return Err(MotionError::NoSample { file: file.into(), joints });
+            return Err(Error::at(file, format_args!("holds no sample; {sample}")));
         }
         Ok(Self { waypoints, smooth: false })
     }
@@ -157,8 +108,8 @@ impl Motion {
     /// Checks that the motion keeps within the limits of `joints`.
     ///
     /// # Errors
-    /// [`MotionError::Limits`] for the first waypoint that does not.
-    pub fn check_limits(&self, joints: &[JointSpec]) -> Result<(), MotionError> {
+    /// Names the first waypoint that does not.
+    pub fn check_limits(&self, joints: &[JointSpec]) -> Result<(), Error> {
         for point in &self.waypoints {
             for (&position, joint) in point.q.iter().zip(joints) {
                 let [least, greatest] = joint.limits;
@@ -173,8 +124,10 @@ impl Motion {
                     }
                     _ => "",
                 };
-                let (time, joint) = (point.time, joint.name.clone());
-                return Err(MotionError::Limits { time, joint, position, least, greatest, hint });
+                let (time, joint) = (point.time, &joint.name);
+                return Err(error!(
+                    "at {time} s joint {joint} is at {position}, beyond its limits [{least}, {greatest}]{hint}"
+                ));
             }
         }
         Ok(())
@@ -311,7 +264,7 @@ mod tests {
         Waypoint { time, q: JointVector::from_slice(q) }
     }
 
-    fn read(text: &[u8]) -> Result<Motion, MotionError> {
+    fn read(text: &[u8]) -> Result<Motion, Error> {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(text).unwrap();
         let label = |name: &str, unit: &str| JointLabel { name: name.into(), unit: unit.into() };
@@ -367,12 +320,11 @@ mod tests {
             let message = read(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");
         }
-        assert!(matches!(read(b""), Err(MotionError::NoSample { .. })));
-        assert!(matches!(read(b"time,shoulder,elbow\n"), Err(MotionError::NoSample { .. })));
-        assert!(matches!(
-            Motion::from_csv(Path::new("/nowhere.csv"), &[]),
-            Err(MotionError::File(TableError::Read { .. }))
-        ));
+        for text in [&b""[..], b"time,shoulder,elbow\n"] {
+            assert!(read(text).unwrap_err().to_string().contains("holds no sample"));
+        }
+        let missing = Motion::from_csv(Path::new("/nowhere.csv"), &[]).unwrap_err().to_string();
+        assert!(missing.starts_with("/nowhere.csv: cannot be read"), "{missing}");
     }
 
     #[test]
@@ -407,11 +359,12 @@ mod tests {
 
     #[test]
     fn impossible_waypoints_are_refused() {
-        assert!(matches!(Motion::through(&[], 1), Err(MotionError::Empty)));
+        let refusal = |waypoints: &[Waypoint]| Motion::through(waypoints, 1).unwrap_err().to_string();
+        assert!(refusal(&[]).contains("no waypoints"));
         let backwards = [waypoint(1.0, &[0.0]), waypoint(1.0, &[0.1])];
-        assert!(matches!(Motion::through(&backwards, 1), Err(MotionError::Time { waypoint: 2, .. })));
+        assert!(refusal(&backwards).starts_with("waypoint 2 of the motion is at 1 s"));
         for q in [&[0.0, 0.0][..], &[f64::NAN], &[]] {
-            assert!(matches!(Motion::through(&[waypoint(0.0, q)], 1), Err(MotionError::Waypoint { .. })), "{q:?}");
+            assert!(refusal(&[waypoint(0.0, q)]).contains("finite coordinates"), "{q:?}");
         }
     }
 }

@@ -4,8 +4,11 @@
 //! hand, a mass on a spring and a damper as in [`super::SimulatedHand`], pulls the device there against the torque that
 //! it feels. Between the pointer's reports the hand holds still. They are exchanged without a lock: the latest counts.
 
-use super::{Applied, Device, HandError, Reading, hand::Arm};
-use crate::{JointVector, input::GREATEST_INPUT, scene::HapticsSpec};
+use super::{
+    Applied, Device, Reading,
+    hand::{Arm, other_joints},
+};
+use crate::{Error, JointVector, error, input::GREATEST_INPUT, scene::HapticsSpec};
 
 /// The device, for the haptic loop.
 #[derive(Debug)]
@@ -26,7 +29,7 @@ impl Pointer {
     ///
     /// # Errors
     /// When the joints do not fit, hand and device have no inertia, or `start` is no place.
-    pub fn new(spec: &HapticsSpec, start: &JointVector) -> Result<(Self, PointerInput), HandError> {
+    pub fn new(spec: &HapticsSpec, start: &JointVector) -> Result<(Self, PointerInput), Error> {
         let arm = Arm::new(spec, start)?;
         check(start, spec.device_inertia.len())?;
         let (goal, read) = triple_buffer::triple_buffer(start);
@@ -39,7 +42,7 @@ impl PointerInput {
     ///
     /// # Errors
     /// When `place` has another number of joints or a coordinate that is none; the hand then keeps its last goal.
-    pub fn move_to(&mut self, place: &JointVector) -> Result<(), HandError> {
+    pub fn move_to(&mut self, place: &JointVector) -> Result<(), Error> {
         check(place, self.joints)?;
         self.goal.write(*place);
         Ok(())
@@ -59,10 +62,13 @@ impl Device for Pointer {
     }
 }
 
-fn check(place: &JointVector, joints: usize) -> Result<(), HandError> {
+fn check(place: &JointVector, joints: usize) -> Result<(), Error> {
     if place.len() != joints {
-        return Err(HandError::Joints { told: place.len(), device: joints });
+        return Err(other_joints(place.len(), joints));
     }
     // False for what is not a number.
-    if place.iter().all(|x| x.abs() <= GREATEST_INPUT) { Ok(()) } else { Err(HandError::Place(*place)) }
+    if place.iter().all(|x| x.abs() <= GREATEST_INPUT) {
+        return Ok(());
+    }
+    Err(error!("{place:?} is no place for a hand: its coordinates must be finite and within reach"))
 }

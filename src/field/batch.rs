@@ -1,52 +1,32 @@
 //! Many look-ups at once, on all cores: row k of an output is made from row k of the configurations.
 
 use super::TorqueField;
+use crate::{Error, error};
 use rayon::prelude::*;
 
 /// Rows that one thread takes at a time: some tens of microseconds of work, beside which sharing them out costs
 /// nothing.
 const SHARE: usize = 256;
 
-/// A batch of look-ups was refused; nothing was written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BatchError {
-    /// A buffer's length does not fit the others.
-    #[error("the {buffer} hold {found} numbers where {expected} are needed: {rows} configurations of {joints} joints")]
-    Length {
-        /// Which buffer.
-        buffer: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length that it should have.
-        expected: usize,
-        /// Whole configurations.
-        rows: usize,
-        /// Joints of the field.
-        joints: usize,
-    },
-    /// A coordinate is no number.
-    #[error("coordinate {joint} of configuration {row} is not a finite number (both counted from 0)")]
-    NotFinite {
-        /// The configuration.
-        row: usize,
-        /// The joint.
-        joint: usize,
-    },
+fn other_length(buffer: &str, found: usize, expected: usize, [rows, joints]: [usize; 2]) -> Error {
+    error!("the {buffer} hold {found} numbers where {expected} are needed: {rows} configurations of {joints} joints")
 }
 
 /// Checks `configurations`, `joints` coordinates each, and returns their number.
 ///
 /// # Errors
 /// When they are not whole rows of finite numbers.
-pub fn check_rows(configurations: &[f64], joints: usize) -> Result<usize, BatchError> {
+pub fn check_rows(configurations: &[f64], joints: usize) -> Result<usize, Error> {
     let (found, rows) = (configurations.len(), configurations.len() / joints);
     if rows * joints != found {
         let (buffer, expected) = ("configurations", (rows + 1) * joints);
-        return Err(BatchError::Length { buffer, found, expected, rows, joints });
+        return Err(other_length(buffer, found, expected, [rows, joints]));
     }
     match configurations.iter().position(|coordinate| !coordinate.is_finite()) {
-        Some(entry) => Err(BatchError::NotFinite { row: entry / joints, joint: entry % joints }),
+        Some(entry) => {
+            let (joint, row) = (entry % joints, entry / joints);
+            Err(error!("coordinate {joint} of configuration {row} is not a finite number (both counted from 0)"))
+        }
         None => Ok(rows),
     }
 }
@@ -61,12 +41,12 @@ pub fn fill_rows<T: Send>(
     joints: usize,
     out: &mut [T],
     write: impl Fn(&[f64], &mut [T]) + Sync,
-) -> Result<(), BatchError> {
+) -> Result<(), Error> {
     let rows = check_rows(configurations, joints)?;
     let width = out.len().checked_div(rows).unwrap_or(0);
     if width * rows != out.len() {
         let (found, expected) = (out.len(), (width + 1) * rows);
-        return Err(BatchError::Length { buffer: "results", found, expected, rows, joints });
+        return Err(other_length("results", found, expected, [rows, joints]));
     }
     if width > 0 {
         fill((configurations, joints), (out, width), &write);
@@ -102,14 +82,14 @@ impl TorqueField {
         configurations: &[f64],
         torques: &mut [f64],
         statuses: Option<&mut [u8]>,
-    ) -> Result<(), BatchError> {
+    ) -> Result<(), Error> {
         let joints = self.joints();
         let rows = check_rows(configurations, joints)?;
         let lengths = [("torques", torques.len(), rows * joints)];
         let optional = statuses.as_ref().map(|statuses| ("statuses", statuses.len(), rows));
         for (buffer, found, expected) in lengths.into_iter().chain(optional) {
             if found != expected {
-                return Err(BatchError::Length { buffer, found, expected, rows, joints });
+                return Err(other_length(buffer, found, expected, [rows, joints]));
             }
         }
         let Some(statuses) = statuses else {
@@ -168,15 +148,15 @@ mod tests {
     fn what_is_no_batch_is_refused_and_nothing_written() {
         let field = field(2);
         let mut out = [7.0; 4];
-        let length = |buffer, found, expected, rows| BatchError::Length { buffer, found, expected, rows, joints: 2 };
-        assert_eq!(field.torques(&[0.0; 3], &mut out, None), Err(length("configurations", 3, 4, 1)));
-        assert_eq!(field.torques(&[0.0; 6], &mut out, None), Err(length("torques", 4, 6, 3)));
-        let refused = field.torques(&[0.0; 4], &mut out, Some(&mut [0; 3]));
-        assert_eq!(refused, Err(length("statuses", 3, 2, 2)));
-        assert_eq!(fill_rows(&[0.0; 6], 2, &mut out, |_, _| ()), Err(length("results", 4, 6, 3)));
+        let refused = |done: Result<(), Error>| done.unwrap_err().to_string();
+        let length = |buffer, found, expected, rows| other_length(buffer, found, expected, [rows, 2]).to_string();
+        assert_eq!(refused(field.torques(&[0.0; 3], &mut out, None)), length("configurations", 3, 4, 1));
+        assert_eq!(refused(field.torques(&[0.0; 6], &mut out, None)), length("torques", 4, 6, 3));
+        assert_eq!(refused(field.torques(&[0.0; 4], &mut out, Some(&mut [0; 3]))), length("statuses", 3, 2, 2));
+        assert_eq!(refused(fill_rows(&[0.0; 6], 2, &mut out, |_, _| ())), length("results", 4, 6, 3));
         for bad in [f64::NAN, f64::INFINITY] {
-            let refused = field.torques(&[0.3, 0.3, 0.3, bad], &mut out, None);
-            assert_eq!(refused, Err(BatchError::NotFinite { row: 1, joint: 1 }));
+            let refused = refused(field.torques(&[0.3, 0.3, 0.3, bad], &mut out, None));
+            assert!(refused.starts_with("coordinate 1 of configuration 1"), "{refused}");
         }
         assert_eq!(out, [7.0; 4]);
     }

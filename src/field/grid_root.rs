@@ -14,15 +14,15 @@
 //! Numbers are f64: of f32 the differences of neighbours lose their digits below a spacing of 5e-4 rad.
 
 use super::{
-    FieldError,
     points::{Around, Checked, Generations, Point},
     potential::{Potential, RootNodes},
+    unfit,
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::RESIDUAL_FLOOR,
     dataset::Grid,
-    memory,
+    error, memory,
     store::{Cell, Gathered, Levels, Place, Root, record::width, with_joints},
 };
 use std::sync::Arc;
@@ -41,12 +41,20 @@ pub(super) struct GridRoot {
 
 impl GridRoot {
     /// The potential of `data`.
-    pub fn potential(data: Checked<'_>) -> Result<Potential<Self>, FieldError> {
+    pub fn potential(data: Checked<'_>) -> Result<Potential<Self>, Error> {
         if data.dataset.energy.is_none() {
-            return Err(FieldError::Missing { column: "energy", interpolation: "potential" });
+            return Err(unfit(
+                "the dataset holds no energy, as datasets of real objects do not, and the scene asks for interpolation = \
+                 \"potential\", which needs it: set interpolation = \"linear\" in [haptics], or bake a virtual object",
+            ));
         }
         let (grid, count) = (&data.dataset.grid, data.points.len());
-        memory::check(count.saturating_mul(size_of::<f64>() * width(grid.joints())))?;
+        memory::check(count.saturating_mul(size_of::<f64>() * width(grid.joints()))).map_err(|shortage| {
+            error!(
+                "the interpolation: {shortage}; or set interpolation = \"linear\" in [haptics], which takes less, or take \
+                 a coarser grid"
+            )
+        })?;
         let is_free = |p: &usize| data.points[*p].is_present() && !data.points[*p].in_contact;
         let free_energy = (0..count).find(is_free).map_or(Ok(0.0), |point| data.energy(point))?;
         let zeros = JointVector::zeros(grid.joints());

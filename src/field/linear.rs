@@ -9,12 +9,12 @@
 //! object where the measurements do: it keeps the value that it has there.
 
 use super::{
-    FieldError, Flags, Interpolant, Sample,
+    Flags, Interpolant, Sample,
     boundary::BoundaryLayer,
     points::{Around, Checked, Point},
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     dataset::{Axis, Grid, Stencil},
     store::with_joints,
 };
@@ -41,7 +41,7 @@ struct Interpolated {
 
 impl Linear {
     /// Interpolates the torque of `data`, in contact where the index exceeds `threshold`.
-    pub fn new(data: Checked<'_>, threshold: f64, slope: &JointVector) -> Result<Self, FieldError> {
+    pub fn new(data: Checked<'_>, threshold: f64, slope: &JointVector) -> Result<Self, Error> {
         let grid = data.dataset.grid.clone();
         let layer = BoundaryLayer::new(&grid, slope);
         let zeros = JointVector::zeros(grid.joints());

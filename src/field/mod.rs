@@ -16,7 +16,6 @@
 mod batch;
 mod bernstein;
 pub mod boundary;
-mod error;
 mod flags;
 mod grid_root;
 mod linear;
@@ -28,16 +27,16 @@ mod slope;
 mod stiffness;
 mod work;
 
-pub use batch::{BatchError, check_rows, fill_rows};
-pub use error::FieldError;
+pub use batch::{check_rows, fill_rows};
 pub use flags::Flags;
 pub(crate) use grid_root::LEAST_ENERGY;
 pub(crate) use slope::GRADIENT_STEP;
 
 use crate::{
-    JointVector,
+    Error, ErrorKind, JointVector,
     contact::{Slip, Status},
     dataset::{Dataset, Grid},
+    error,
     scene::Interpolation,
 };
 use grid_root::GridRoot;
@@ -103,6 +102,11 @@ impl Sample {
     }
 }
 
+/// The error of a dataset that cannot be rendered.
+fn unfit(what: impl Into<String>) -> Error {
+    Error::new(what).of(ErrorKind::Dataset)
+}
+
 impl TorqueField {
     /// The field of `dataset`; a refined one is interpolated by `potential`, whatever `interpolation` says. `threshold`,
     /// Ith (1), and `slope`, Ks of the boundary layer, one per joint (N m/rad), count for `linear` alone; `potential`
@@ -116,14 +120,18 @@ impl TorqueField {
         interpolation: Interpolation,
         threshold: f64,
         slope: &JointVector,
-    ) -> Result<Self, FieldError> {
+    ) -> Result<Self, Error> {
         if !(0.0..1.0).contains(&threshold) {
-            return Err(FieldError::Threshold(threshold));
+            return Err(error!(
+                "the contact index threshold is {threshold}; it must be at least 0 and below 1 (the paper uses 0.5)"
+            ));
         }
-        dataset.grid.check().map_err(FieldError::Grid)?;
+        dataset.grid.check().map_err(unfit)?;
         let grid = dataset.grid.clone();
         if slope.len() != grid.joints() || !slope.iter().all(|slope| *slope > 0.0 && slope.is_finite()) {
-            return Err(FieldError::Slope(*slope));
+            return Err(error!(
+                "the boundary slope is {slope:?}; it must be one positive number of N m/rad per joint of the dataset"
+            ));
         }
         let interpolant: Box<dyn Interpolant> = match (&dataset.refinement, interpolation) {
             (Some(store), _) => Box::new(Potential::new(Arc::clone(store), 0.0)),

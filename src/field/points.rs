@@ -1,9 +1,9 @@
 //! The facts that a field has at each grid point beside numbers that are interpolated, and those where nothing was
 //! computed.
 
-use super::{FieldError, Flags, Sample};
+use super::{Flags, Sample, unfit};
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::Status,
     dataset::{Dataset, Grid},
     input::GREATEST_INPUT,
@@ -108,7 +108,7 @@ pub(super) struct Checked<'a> {
 
 impl<'a> Checked<'a> {
     /// Checks `dataset`.
-    pub fn new(dataset: &'a Dataset) -> Result<Self, FieldError> {
+    pub fn new(dataset: &'a Dataset) -> Result<Self, Error> {
         let (grid, count) = (&dataset.grid, dataset.grid.points());
         expect("torque", count.saturating_mul(grid.joints()), dataset.torque.len())?;
         expect("status", count, dataset.status.len())?;
@@ -125,7 +125,8 @@ impl<'a> Checked<'a> {
             expect("contact offsets", count + 1, contacts.offsets.len())?;
         }
         let mut points: Vec<Point> = (0..count).map(|point| Point::of(dataset, point)).collect();
-        let nearest = nearest_present(grid, &points).ok_or(FieldError::Empty)?;
+        let nearest = nearest_present(grid, &points)
+            .ok_or_else(|| unfit("no grid point of the dataset was computed: finish the bake first"))?;
         for (point, &source) in nearest.iter().enumerate() {
             points[point].touching = points[source].in_contact;
         }
@@ -133,7 +134,7 @@ impl<'a> Checked<'a> {
     }
 
     /// tau of `point`, or of the nearest that was computed; zeros where that is free.
-    pub fn torque<'b>(&'b self, point: usize, zeros: &'b [f64]) -> Result<&'b [f64], FieldError> {
+    pub fn torque<'b>(&'b self, point: usize, zeros: &'b [f64]) -> Result<&'b [f64], Error> {
         let source = self.nearest[point];
         let torque = if self.points[source].in_contact { self.dataset.torque(source) } else { zeros };
         torque.iter().try_for_each(|&tau| plausible("torque", source, tau))?;
@@ -148,7 +149,7 @@ impl<'a> Checked<'a> {
     }
 
     /// U of `point`, or of the nearest that was computed; zero where the dataset has none (J).
-    pub fn energy(&self, point: usize) -> Result<f64, FieldError> {
+    pub fn energy(&self, point: usize) -> Result<f64, Error> {
         let source = self.nearest[point];
         let energy = self.dataset.energy.as_ref().map_or(0.0, |energy| energy[source]);
         plausible("energy", source, energy)?;
@@ -156,14 +157,20 @@ impl<'a> Checked<'a> {
     }
 }
 
-pub(super) fn expect(column: &'static str, expected: usize, found: usize) -> Result<(), FieldError> {
-    if expected == found { Ok(()) } else { Err(FieldError::Length { column, expected, found }) }
+pub(super) fn expect(column: &str, expected: usize, found: usize) -> Result<(), Error> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(unfit(format!("the dataset's {column} has {found} entries where its grid asks for {expected}: bake it again")))
 }
 
 /// Whether `value` of `column` may enter the loop.
-pub(super) fn plausible(column: &'static str, point: usize, value: f64) -> Result<(), FieldError> {
+pub(super) fn plausible(column: &str, point: usize, value: f64) -> Result<(), Error> {
     // False for what is not a number.
-    if value.abs() <= GREATEST_INPUT { Ok(()) } else { Err(FieldError::Value { column, point, value }) }
+    if value.abs() <= GREATEST_INPUT {
+        return Ok(());
+    }
+    Err(unfit(format!("the dataset's {column} at grid point {point} is {value}: bake it again")))
 }
 
 /// For each grid point the nearest one that was computed, in steps along the axes; itself if it was. `None` if none

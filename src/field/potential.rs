@@ -78,7 +78,7 @@ impl RootNodes for Store {
     /// A store does not say what it does not keep: how many nodes of the object touch.
     fn around(&self, q: &[f64], _: &Cell, root: &Root) -> Around {
         let mut flags = Flags::empty();
-        flags.set(Flags::ABSENT, root.whole == 0);
+        flags.set(Flags::ABSENT, root.absent);
         flags.set(Flags::UNCONVERGED, root.failed);
         let index = f64::from(u8::from(root.value > 0.0));
         Around { fade: self.base().fade(q), share: 1.0, flags, index, contact_nodes: 0 }

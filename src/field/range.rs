@@ -19,11 +19,11 @@
 //! is what keeps the step passive (`render/npmi/stops.rs`).
 
 use super::{
-    FieldError,
     points::{Checked, Generations, plausible},
+    unfit,
 };
 use crate::{
-    JointVector, MAX_JOINTS,
+    Error, JointVector, MAX_JOINTS,
     contact::Status,
     dataset::{Axis, Dataset, Grid},
     proxy::{Chain, Node},
@@ -99,9 +99,9 @@ impl HaptizedRange {
     ///
     /// # Errors
     /// When the dataset is not consistent, or a gap is not a number.
-    pub fn new(dataset: &Dataset, chain: &Chain) -> Result<Self, FieldError> {
+    pub fn new(dataset: &Dataset, chain: &Chain) -> Result<Self, Error> {
         let grid = &dataset.grid;
-        grid.check().map_err(FieldError::Grid)?;
+        grid.check().map_err(unfit)?;
         let mut range = Self::of_grid(grid);
         let mut open = [false; MAX_JOINTS];
         let mut reached = range.ends;
@@ -122,8 +122,7 @@ impl HaptizedRange {
                     for bounds in chain.jacobian_bounds(&reached) {
                         levers.iter_mut().zip(bounds.iter()).for_each(|(lever, bound)| *lever = lever.max(*bound));
                     }
-                    let mut clearances =
-                        gap.iter().enumerate().map(clearance).collect::<Result<Vec<f32>, FieldError>>()?;
+                    let mut clearances = gap.iter().enumerate().map(clearance).collect::<Result<Vec<f32>, Error>>()?;
                     spread(grid, &levers, &mut clearances);
                     Beyond { open, clearances, levers, object: Surroundings::new(dataset, chain) }
                 }

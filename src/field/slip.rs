@@ -6,11 +6,11 @@
 //! the torque itself is interpolated and held behind a boundary layer, there is no w_bar: so is the normal force then.
 
 use super::{
-    FieldError,
     grid_root::{LEAST_ENERGY, corners},
     points::{Checked, Generations, expect, plausible},
 };
 use crate::{
+    Error,
     contact::Slip,
     dataset::{Grid, SlipColumns},
     joint_matrix::entries,
@@ -56,7 +56,7 @@ pub(super) struct GridSlips {
 
 impl GridSlips {
     /// Those of the columns `slip` of `data`, for a torque that has a potential or has none.
-    pub fn new(data: &Checked<'_>, slip: &SlipColumns, is_potential: bool) -> Result<Self, FieldError> {
+    pub fn new(data: &Checked<'_>, slip: &SlipColumns, is_potential: bool) -> Result<Self, Error> {
         let (grid, count) = (&data.dataset.grid, data.points.len());
         let (wide, entries) = (width(grid.joints()), entries(grid.joints()));
         expect("normal force", count, slip.normal_force.len())?;

@@ -14,9 +14,9 @@ use super::{
     buffer::StorageBuffer, context::Context, dispatch::Dispatch, error::GpuError, kernel::Kernel,
     layout::FrameParameters, shaders,
 };
-use crate::memory::{self, Shortage};
-use crate::object::{Attachment, Compliance, Factor, FactorError, Object, Stiffening, Stiffness, settled};
+use crate::object::{Attachment, Compliance, Factor, Object, Stiffening, Stiffness, settled};
 use crate::scene::GraphicsEffects;
+use crate::{Error, error, memory};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -54,28 +54,6 @@ impl FrameMethod {
             Self::Iterations(Self::USUAL_ITERATIONS)
         }
     }
-}
-
-/// Why the frame update cannot be set up.
-#[derive(Debug, thiserror::Error)]
-pub enum FrameError {
-    /// The device.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// The matrix.
-    #[error(transparent)]
-    Matrix(#[from] FactorError),
-    /// The inverse would not fit in memory.
-    #[error("the motion of an object of {nodes} nodes: {shortage}, or use a coarser surface")]
-    Memory {
-        /// Nodes of the object.
-        nodes: usize,
-        /// Memory that is needed, and that is left.
-        shortage: Shortage,
-    },
-    /// The time between frames is not a positive number.
-    #[error("the time between frames is {0} s; it must be a positive number")]
-    Period(f64),
 }
 
 /// One dispatch of every frame.
@@ -156,9 +134,9 @@ impl FrameUpdate {
         period: f64,
         method: FrameMethod,
         effects: &GraphicsEffects,
-    ) -> Result<Self, FrameError> {
+    ) -> Result<Self, Error> {
         if !(period > 0.0 && period.is_finite()) {
-            return Err(FrameError::Period(period));
+            return Err(error!("the time between frames is {period} s; it must be a positive number"));
         }
         let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
         let weight: Vec<DVec3> =
@@ -321,7 +299,7 @@ fn start(
     weight: &[DVec3],
     stiffening: Option<&Stiffening>,
     effects: &GraphicsEffects,
-) -> Result<Vec<[f32; 4]>, FactorError> {
+) -> Result<Vec<[f32; 4]>, Error> {
     let nodes = object.moved.len();
     let mut start = vec![[0.0; 4]; if effects.quasi_static { nodes } else { 2 * nodes }];
     if !weight.is_empty() {
@@ -340,7 +318,7 @@ fn inverse(
     stiffness: &Stiffness,
     period: f64,
     effects: &GraphicsEffects,
-) -> Result<(Vec<f32>, bool), FrameError> {
+) -> Result<(Vec<f32>, bool), Error> {
     let nodes = object.moved.len();
     let inertia = object.mass.iter().zip(&object.damping);
     let mut diagonal: Vec<f64> = inertia.map(|(mass, damping)| 2.0 * mass / period + damping).collect();
@@ -355,11 +333,11 @@ fn inverse(
 
 /// Refuses an inverse over `nodes` nodes that would not fit in the host's memory, before anything is allocated: f64 as
 /// it is solved, f32 as the device takes it, and once more on its way there.
-fn check_memory(nodes: usize, is_isotropic: bool) -> Result<(), FrameError> {
+fn check_memory(nodes: usize, is_isotropic: bool) -> Result<(), Error> {
     let order = nodes.saturating_mul(if is_isotropic { 1 } else { 3 });
     let bytes = order.saturating_pow(2).saturating_mul(size_of::<f64>() + 2 * size_of::<f32>());
     let enough = if bytes > memory::SMALL { memory::check(bytes) } else { Ok(()) };
-    enough.map_err(|shortage| FrameError::Memory { nodes, shortage })
+    enough.map_err(|shortage| error!("the motion of an object of {nodes} nodes: {shortage}, or use a coarser surface"))
 }
 
 /// Vectors of the iteration: v_hat, residual, direction, product, diagonal.
@@ -534,11 +512,8 @@ mod tests {
         assert!(check_memory(100, true).is_ok() && check_memory(100, false).is_ok());
         // 2^24 nodes need 2^52 bytes, or nine times as many.
         for (is_isotropic, megabytes) in [(true, "4503599628 MB"), (false, "40532396647 MB")] {
-            let Err(FrameError::Memory { nodes, shortage }) = check_memory(1 << 24, is_isotropic) else {
-                panic!("no machine has so much memory");
-            };
-            assert_eq!(nodes, 1 << 24);
-            let said = FrameError::Memory { nodes, shortage }.to_string();
+            let said = check_memory(1 << 24, is_isotropic).unwrap_err().to_string();
+            assert!(said.contains("of 16777216 nodes"), "{said}");
             assert!(said.contains(megabytes) && said.contains("ulimit -v") && said.contains("coarser"), "{said}");
         }
     }

@@ -8,8 +8,8 @@
 //! Samples within [`MERGE_DISTANCE`] are averaged into one point: duplicates have no triangulation. The jitter is a
 //! hash of a point's own coordinates, hence the same in every run and in any order.
 
-use super::{GridizeError, samples::Samples};
-use crate::{MAX_JOINTS, random::mix};
+use super::samples::Samples;
+use crate::{Error, MAX_AXES, error, random::mix};
 use std::collections::HashMap;
 
 /// Samples closer than this fraction of the extent are one point: far below any encoder's resolution (a 16-bit encoder
@@ -25,7 +25,7 @@ pub const JITTER: f64 = 1.0 / (1_u64 << 40) as f64;
 const FLAT_CLOUD: f64 = 1e-6;
 
 /// A position in scaled C-space; entries beyond the number of joints are zero.
-pub(super) type Position = [f64; MAX_JOINTS];
+pub(super) type Position = [f64; MAX_AXES];
 
 /// Distinct points in scaled C-space with the averaged torque of each.
 pub(super) struct Cloud {
@@ -48,13 +48,19 @@ pub(super) struct Cloud {
     pub merged: usize,
 }
 
+/// The error of so few distinct samples that they cannot span `joints` joints.
+fn too_few(have: usize, joints: usize) -> Error {
+    let need = joints + 1;
+    error!("{have} distinct samples cannot span {joints} joints; at least {need} are needed")
+}
+
 impl Cloud {
     /// Scales and merges `samples`, which must have passed [`Samples::check`].
-    pub fn new(samples: &Samples) -> Result<Self, GridizeError> {
+    pub fn new(samples: &Samples) -> Result<Self, Error> {
         let joints = samples.joints.len();
         let need = joints + 1;
         if samples.len() < need {
-            return Err(GridizeError::TooFew { have: samples.len(), need, joints });
+            return Err(too_few(samples.len(), joints));
         }
         let (origin, scale) = frame(samples)?;
         let mut cloud = Self {
@@ -64,13 +70,13 @@ impl Cloud {
             positions: Vec::new(),
             torques: Vec::new(),
             variances: Vec::new(),
-            centre: [0.0; MAX_JOINTS],
+            centre: [0.0; MAX_AXES],
             spanning: Vec::new(),
             merged: 0,
         };
         cloud.merge(samples);
         if cloud.positions.len() < need {
-            return Err(GridizeError::TooFew { have: cloud.positions.len(), need, joints });
+            return Err(too_few(cloud.positions.len(), joints));
         }
         for position in &cloud.positions {
             for (sum, x) in cloud.centre.iter_mut().zip(position) {
@@ -83,7 +89,7 @@ impl Cloud {
 
     /// `q` in scaled coordinates.
     pub fn scaled(&self, q: &[f64]) -> Position {
-        let mut position = [0.0; MAX_JOINTS];
+        let mut position = [0.0; MAX_AXES];
         for (joint, x) in position.iter_mut().enumerate().take(self.joints) {
             *x = (q[joint] - self.origin[joint]) * self.scale[joint];
         }
@@ -103,7 +109,7 @@ impl Cloud {
 
     fn merge(&mut self, samples: &Samples) {
         let joints = self.joints;
-        let mut cells: HashMap<[i64; MAX_JOINTS], usize> = HashMap::with_capacity(samples.len());
+        let mut cells: HashMap<[i64; MAX_AXES], usize> = HashMap::with_capacity(samples.len());
         let mut counts: Vec<f64> = Vec::new();
         let rows = samples.configurations.chunks_exact(joints).zip(samples.torques.chunks_exact(joints));
         for (sample, (q, torque)) in rows.enumerate() {
@@ -137,19 +143,22 @@ impl Cloud {
 }
 
 /// Origin and scale of the unit box of each unit.
-fn frame(samples: &Samples) -> Result<(Position, Position), GridizeError> {
+fn frame(samples: &Samples) -> Result<(Position, Position), Error> {
     let joints = samples.joints.len();
-    let mut low = [0.0; MAX_JOINTS];
-    let mut extent = [0.0; MAX_JOINTS];
+    let mut low = [0.0; MAX_AXES];
+    let mut extent = [0.0; MAX_AXES];
     for joint in 0..joints {
         let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
         low[joint] = column().fold(f64::INFINITY, f64::min);
         extent[joint] = column().fold(f64::NEG_INFINITY, f64::max) - low[joint];
         if !extent[joint].is_finite() || extent[joint] <= f64::MIN_POSITIVE {
-            return Err(GridizeError::NoExtent { joint: samples.joints[joint].name.clone() });
+            let joint = &samples.joints[joint].name;
+            return Err(error!(
+                "joint `{joint}` has the same position in every sample: leave it out, or move it in the scan"
+            ));
         }
     }
-    let mut scale = [0.0; MAX_JOINTS];
+    let mut scale = [0.0; MAX_AXES];
     for (scale, label) in scale.iter_mut().zip(&samples.joints) {
         let group = samples.joints.iter().zip(extent).filter(|(other, _)| other.unit == label.unit);
         *scale = 1.0 / group.map(|(_, extent)| extent).fold(0.0, f64::max);
@@ -158,7 +167,7 @@ fn frame(samples: &Samples) -> Result<(Position, Position), GridizeError> {
 }
 
 /// Grows a simplex by the point farthest from the span of those chosen before; refuses a cloud that is flat.
-fn spanning_simplex(positions: &[Position], joints: usize) -> Result<Vec<u32>, GridizeError> {
+fn spanning_simplex(positions: &[Position], joints: usize) -> Result<Vec<u32>, Error> {
     let origin = positions[0];
     let mut residuals: Vec<Position> =
         positions.iter().map(|position| std::array::from_fn(|joint| position[joint] - origin[joint])).collect();
@@ -172,7 +181,10 @@ fn spanning_simplex(positions: &[Position], joints: usize) -> Result<Vec<u32>, G
             .fold((0, 0.0), |best, next| if next.1 > best.1 { next } else { best });
         let distance = square.sqrt();
         if distance < FLAT_CLOUD {
-            return Err(GridizeError::Flat { rank, joints, thickness: distance });
+            return Err(error!(
+                "the samples span only {rank} of {joints} joint directions (thickness {distance:.1e} of the extent): \
+                 measure off that line or plane too, or leave out a joint"
+            ));
         }
         let direction = residuals[farthest].map(|x| x / distance);
         for residual in &mut residuals {

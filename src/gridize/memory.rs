@@ -7,18 +7,26 @@
 //! memory left of it, gridized again, and so on until the terms stay.
 
 use super::{
-    GridizeError, GridizeOptions, GridizeReport, Samples,
+    GridizeOptions, GridizeReport, Samples,
     energy::energy,
     gridize,
     relaxation::{Identified, Stretch, identify},
 };
 use crate::{
-    JointVector, MAX_JOINTS,
+    Error, JointVector, MAX_JOINTS,
     dataset::{Dataset, IdentifiedRelaxation, JointLabel},
+    error,
     field::{Flags, TorqueField},
     scene::{Interpolation, MOST_TERMS, THRESHOLD},
 };
 use std::collections::BTreeMap;
+
+/// What is wrong with histories of which nothing can be compared.
+const NO_HISTORY: &str = "no history has rows that count inside the grid: take a smaller step, so that it reaches farther, or record in the middle \
+     of the range";
+
+/// What is wrong where nothing fades.
+const NO_RELAXATION: &str = "no relaxation is found: the torque does not fade measurably while the object is held; leave it out, or hold longer";
 
 /// Rounds of gridizing and identifying, at most; and the change of every term over its size at which they end: a tenth
 /// of what is asked of an identified term.
@@ -60,7 +68,7 @@ pub fn gridize_remembering(
     samples: &Samples,
     (histories, past): (&[ForceHistory], Past),
     options: &GridizeOptions,
-) -> Result<(Dataset, GridizeReport), GridizeError> {
+) -> Result<(Dataset, GridizeReport), Error> {
     let scaled = past == Past::Presses;
     let mut samples = match past {
         Past::Presses => samples.clone(),
@@ -70,10 +78,10 @@ pub fn gridize_remembering(
     for _ in 0..ROUNDS {
         let (mut dataset, report) = with_energy(&samples, options)?;
         let stretches = stretches(&dataset, histories)?;
-        let found = identify(&stretches, MOST_TERMS, scaled).ok_or(GridizeError::NoHistory)?;
+        let found = identify(&stretches, MOST_TERMS, scaled).ok_or_else(|| Error::from(NO_HISTORY))?;
         if found.terms.is_empty() {
             // An object that does not relax is as it was measured at rest.
-            return if scaled { Ok((dataset, report)) } else { Err(GridizeError::NoRelaxation) };
+            return if scaled { Ok((dataset, report)) } else { Err(NO_RELAXATION.into()) };
         }
         if scaled || found.is_near(&last, SETTLED) {
             scale(&mut dataset, found.scale);
@@ -89,19 +97,21 @@ pub fn gridize_remembering(
         samples = fresh(&samples.joints, histories, &left, &options.steps);
         last = found;
     }
-    Err(GridizeError::Unsettled(ROUNDS))
+    Err(error!(
+        "relaxation was still changing after {ROUNDS} rounds: take a larger step, so that each cell holds more rows"
+    ))
 }
 
 /// The misfit of `dataset` and its relaxation on other histories, over their torque, rms (1).
 ///
 /// # Errors
 /// When the dataset has no energy.
-pub fn predict_histories(dataset: &Dataset, histories: &[ForceHistory]) -> Result<f64, GridizeError> {
+pub fn predict_histories(dataset: &Dataset, histories: &[ForceHistory]) -> Result<f64, Error> {
     let terms = dataset.provenance.relaxation.as_ref().map_or(&[][..], |relaxation| &relaxation.terms);
     Ok(misfit(&stretches(dataset, histories)?, terms, false))
 }
 
-fn with_energy(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), GridizeError> {
+fn with_energy(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), Error> {
     let (mut dataset, report) = gridize(samples, options)?;
     let energy = energy(&dataset.grid, &dataset.torque, &dataset.status);
     dataset.energy = Some(energy.into());
@@ -115,12 +125,12 @@ fn scale(dataset: &mut Dataset, scale: f64) {
 }
 
 /// The histories as the potential of `dataset` has them.
-fn stretches(dataset: &Dataset, histories: &[ForceHistory]) -> Result<Vec<Stretch>, GridizeError> {
+fn stretches(dataset: &Dataset, histories: &[ForceHistory]) -> Result<Vec<Stretch>, Error> {
     let joints = dataset.grid.joints();
     let mut slopes = JointVector::zeros(joints);
     slopes.fill(1.0);
     let field = TorqueField::interpolated(dataset, Interpolation::Potential, THRESHOLD, &slopes);
-    let field = field.map_err(|error| GridizeError::Field(error.to_string()))?;
+    let field = field.map_err(|error| error.within("the gridized torque cannot be interpolated"))?;
     let of = |history: &ForceHistory| {
         let mut stretch =
             Stretch { times: history.times.clone(), counts: history.counts.clone(), ..Stretch::default() };

@@ -26,12 +26,13 @@ mod space;
 mod tetrahedra;
 
 pub use memory::{ForceHistory, Past, gridize_remembering, predict_histories};
-pub use samples::{Samples, SamplesError};
+pub use samples::Samples;
 
 use crate::{
-    MAX_JOINTS,
+    Error, MAX_AXES,
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
+    error,
     scene::GRID_LINE,
 };
 use cloud::{Cloud, JITTER};
@@ -95,129 +96,18 @@ pub struct GridizeReport {
     pub epsilon: f64,
 }
 
-/// Why a gridization was refused.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum GridizeError {
-    /// The samples are not usable.
-    #[error(transparent)]
-    Samples(#[from] SamplesError),
-    /// Too few distinct samples.
-    #[error("{have} distinct samples cannot span {joints} joints; at least {need} are needed")]
-    TooFew {
-        /// Distinct samples given.
-        have: usize,
-        /// Least number.
-        need: usize,
-        /// Number of joints.
-        joints: usize,
-    },
-    /// A joint that did not move.
-    #[error("joint `{joint}` has the same position in every sample: leave it out, or move it in the scan")]
-    NoExtent {
-        /// The joint's name.
-        joint: String,
-    },
-    /// All samples in a subspace.
-    #[error(
-        "the samples span only {rank} of {joints} joint directions (thickness {thickness:.1e} of the extent): measure \
-         off that line or plane too, or leave out a joint"
-    )]
-    Flat {
-        /// Directions spanned.
-        rank: usize,
-        /// Number of joints.
-        joints: usize,
-        /// Extent in the next direction, as a fraction of the widest.
-        thickness: f64,
-    },
-    /// A step that is no step.
-    #[error("grid step {step} of joint `{joint}` is not a positive number")]
-    Step {
-        /// The joint's name.
-        joint: String,
-        /// The step.
-        step: f64,
-    },
-    /// One step a joint, or one for all.
-    #[error("{have} grid steps were given for {joints} joints: give one step, or one a joint")]
-    Steps {
-        /// Steps given.
-        have: usize,
-        /// Number of joints.
-        joints: usize,
-    },
-    /// A grid without a point.
-    #[error("no multiple of the grid step {step} lies within the range of joint `{joint}`: take a smaller step")]
-    NoGridLine {
-        /// The joint's name.
-        joint: String,
-        /// The step.
-        step: f64,
-    },
-    /// A grid over the limit.
-    #[error("the grid would hold {points:.3e} points, the limit is {limit:.0e}: take a larger step")]
-    TooManyPoints {
-        /// Points of the grid.
-        points: f64,
-        /// The limit.
-        limit: f64,
-    },
-    /// A negative or infinite threshold.
-    #[error("torque threshold {0} is not a number of zero or more")]
-    Epsilon(f64),
-    /// Natural neighbours are defined here for two joints only.
-    #[error("natural neighbour interpolation takes 2 joints, the samples have {0}: use linear interpolation")]
-    NaturalNeighbours(usize),
-    /// Too many tetrahedra.
-    #[error(
-        "triangulating {points} samples passed the limit of {limit} simplices: their arrangement is degenerate (two \
-         skew lines, say); decimate them"
-    )]
-    TooManySimplices {
-        /// Distinct samples.
-        points: usize,
-        /// The limit.
-        limit: usize,
-    },
-    /// Nothing of the histories can be compared.
-    #[error(
-        "no history has rows that count inside the grid: take a smaller step, so that it reaches farther, or record in \
-         the middle of the range"
-    )]
-    NoHistory,
-    /// Nothing fades.
-    #[error(
-        "no relaxation is found: the torque does not fade measurably while the object is held; leave it out, or hold \
-         longer"
-    )]
-    NoRelaxation,
-    /// Gridizing and identifying do not come to an end.
-    #[error("relaxation was still changing after {0} rounds: take a larger step, so that each cell holds more rows")]
-    Unsettled(usize),
-    /// The gridized torque has no potential.
-    #[error("the gridized torque cannot be interpolated: {0}")]
-    Field(String),
-    /// Nothing says how far smoothing may go.
-    #[error("smoothing needs the standard deviation of the samples, and none was measured: leave it out")]
-    NoDeviations,
-    /// Refused by the triangulation library.
-    #[error("the samples cannot be triangulated: {0}")]
-    Triangulation(String),
-}
-
 /// Interpolates `samples` on a uniform grid whose lines lie at multiples of the step, within the samples' range.
 ///
 /// The dataset holds torque and status: no energy, gap, contact forces or surface, which nobody measured. Torque is
 /// zero where the status is [`Status::Outside`].
 ///
 /// # Errors
-/// [`GridizeError`]: samples that are not finite, too few, flat in C-space, or a grid that is empty or too large.
-pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), GridizeError> {
+/// When samples are not finite, too few, flat in C-space, or a grid that is empty or too large.
+pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), Error> {
     samples.check()?;
     let epsilon = options.epsilon.unwrap_or_else(|| default_epsilon(samples));
     if !(epsilon.is_finite() && epsilon >= 0.0) {
-        return Err(GridizeError::Epsilon(epsilon));
+        return Err(error!("torque threshold {epsilon} is not a number of zero or more"));
     }
     let mut cloud = Cloud::new(samples)?;
     if options.smooth {
@@ -227,7 +117,11 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
     let linear = |pull| (pull, &cloud);
     let torque = match (options.interpolation, cloud.joints) {
         (Interpolation::Natural, 2) => fill(&plane::NaturalNeighbours::new(&cloud)?, &cloud, &grid),
-        (Interpolation::Natural, joints) => return Err(GridizeError::NaturalNeighbours(joints)),
+        (Interpolation::Natural, joints) => {
+            return Err(error!(
+                "natural neighbour interpolation takes 2 joints, the samples have {joints}: use linear interpolation"
+            ));
+        }
         (Interpolation::Linear, 1) => fill_linear(line::Line::new(&cloud), linear(HULL_PULL), &grid),
         (Interpolation::Linear, 2) => fill_linear(plane::Plane::new(&cloud)?, linear(HULL_PULL), &grid),
         (Interpolation::Linear, 3) => fill_linear(space::Space::new(&cloud)?, linear(HULL_PULL), &grid),
@@ -281,17 +175,19 @@ fn norms(column: &[f64], joints: usize) -> impl Iterator<Item = f64> {
 }
 
 /// Grid lines at multiples of the step inside the samples' range.
-fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, GridizeError> {
+fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, Error> {
     let joints = samples.joints.len();
     if steps.len() != 1 && steps.len() != joints {
-        return Err(GridizeError::Steps { have: steps.len(), joints });
+        let have = steps.len();
+        return Err(error!("{have} grid steps were given for {joints} joints: give one step, or one a joint"));
     }
     let mut axes = Vec::with_capacity(joints);
     let mut points = 1.0;
     for (joint, label) in samples.joints.iter().enumerate() {
         let step = steps[joint % steps.len()];
         if !(step.is_finite() && step > 0.0) {
-            return Err(GridizeError::Step { joint: label.name.clone(), step });
+            let joint = &label.name;
+            return Err(error!("grid step {step} of joint `{joint}` is not a positive number"));
         }
         let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
         let [low, high] = [column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max)];
@@ -301,11 +197,16 @@ fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, GridizeError> {
         let last = (high / step + slack).floor();
         let count = last - first + 1.0;
         if count < 1.0 {
-            return Err(GridizeError::NoGridLine { joint: label.name.clone(), step });
+            let joint = &label.name;
+            return Err(error!(
+                "no multiple of the grid step {step} lies within the range of joint `{joint}`: take a smaller step"
+            ));
         }
         points *= count;
         if points > GRID_POINTS {
-            return Err(GridizeError::TooManyPoints { points, limit: GRID_POINTS });
+            return Err(error!(
+                "the grid would hold {points:.3e} points, the limit is {GRID_POINTS:.0e}: take a larger step"
+            ));
         }
         axes.push(Axis {
             name: label.name.clone(),
@@ -336,7 +237,7 @@ fn fill<I: Interpolant>(interpolant: &I, cloud: &Cloud, grid: &Grid) -> (Vec<f64
     let blocks = torque.par_chunks_mut(BLOCK * joints).zip(inside.par_chunks_mut(BLOCK)).enumerate();
     blocks.for_each(|(block, (torque, inside))| {
         let mut walk = interpolant.walk();
-        let mut weights = Vec::with_capacity(MAX_JOINTS + 1);
+        let mut weights = Vec::with_capacity(MAX_AXES + 1);
         for (offset, (torque, inside)) in torque.chunks_exact_mut(joints).zip(inside).enumerate() {
             let q = grid.configuration(block * BLOCK + offset);
             interpolant.weights(&mut walk, &cloud.scaled(&q), &mut weights);

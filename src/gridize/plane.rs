@@ -2,15 +2,14 @@
 //! neighbour interpolation on it.
 
 use super::{
-    GridizeError,
-    cloud::{Cloud, Position},
-    interpolant::{Interpolant, Simplex, Triangulation, pulled_in},
-};
-use super::{
     HULL_PULL,
     cloud::{JITTER, MERGE_DISTANCE},
 };
-use crate::MAX_JOINTS;
+use super::{
+    cloud::{Cloud, Position},
+    interpolant::{Interpolant, Simplex, Triangulation, pulled_in},
+};
+use crate::{Error, MAX_AXES, error};
 use spade::{
     DelaunayTriangulation, HasPosition, HierarchyHintGenerator, NaturalNeighbor, Point2, PositionInTriangulation,
     Triangulation as _, handles::FixedVertexHandle,
@@ -36,9 +35,9 @@ fn planar(at: &Position) -> Point2<f64> {
     Point2::new(clear(at[0]), clear(at[1]))
 }
 
-fn triangulate(cloud: &Cloud) -> Result<Mesh, GridizeError> {
+fn triangulate(cloud: &Cloud) -> Result<Mesh, Error> {
     let vertices = cloud.positions.iter().zip(0..).map(|(at, point)| Vertex { position: planar(at), point }).collect();
-    Mesh::bulk_load(vertices).map_err(|error| GridizeError::Triangulation(error.to_string()))
+    Mesh::bulk_load(vertices).map_err(|error| error!("the samples cannot be triangulated: {error}"))
 }
 
 /// Triangles in the plane.
@@ -48,7 +47,7 @@ pub(super) struct Plane<'a> {
 }
 
 impl<'a> Plane<'a> {
-    pub fn new(cloud: &'a Cloud) -> Result<Self, GridizeError> {
+    pub fn new(cloud: &'a Cloud) -> Result<Self, Error> {
         Ok(Self { cloud, mesh: triangulate(cloud)? })
     }
 }
@@ -71,7 +70,7 @@ impl Triangulation for Plane<'_> {
             }
             PositionInTriangulation::OutsideOfConvexHull(_) | PositionInTriangulation::NoTriangulation => return None,
         };
-        let mut simplex = [0; MAX_JOINTS + 1];
+        let mut simplex = [0; MAX_AXES + 1];
         for (entry, vertex) in simplex.iter_mut().zip(face.vertices()) {
             *entry = vertex.data().point;
         }
@@ -96,7 +95,7 @@ pub(super) struct NeighbourWalk<'a> {
 }
 
 impl<'a> NaturalNeighbours<'a> {
-    pub fn new(cloud: &'a Cloud) -> Result<Self, GridizeError> {
+    pub fn new(cloud: &'a Cloud) -> Result<Self, Error> {
         Ok(Self { cloud, mesh: triangulate(cloud)? })
     }
 }

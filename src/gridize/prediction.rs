@@ -6,8 +6,8 @@
 //! dataset can predict a measurement better than measuring again does. Samples beside grid points outside the hull are
 //! not predicted.
 
-use super::{GridizeError, GridizeOptions, Samples, gridize};
-use crate::{contact::Status, dataset::Dataset};
+use super::{GridizeOptions, Samples, gridize};
+use crate::{Error, contact::Status, dataset::Dataset, error};
 
 /// Predicted beside measured torque.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -24,55 +24,32 @@ pub struct Prediction {
     pub deviation: Option<Vec<f64>>,
 }
 
-/// Why there is no prediction.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PredictionError {
-    /// Not a share, or none of so few samples.
-    #[error("a share of {share} of {samples} samples cannot be held out: it must leave some on both sides")]
-    Share {
-        /// The share.
-        share: f64,
-        /// All samples.
-        samples: usize,
-    },
-    /// The rest cannot be gridized.
-    #[error("without the samples held out: {0}")]
-    Gridize(#[from] GridizeError),
-    /// Another arm's samples.
-    #[error("the samples have {samples} joints, the dataset has {dataset}")]
-    Joints {
-        /// Joints of the samples.
-        samples: usize,
-        /// Axes of the dataset's grid.
-        dataset: usize,
-    },
-    /// The grid cannot be looked up.
-    #[error("{0}")]
-    Grid(String),
-}
-
 /// Leaves out `share` of `samples` and predicts them by a dataset of the rest.
 ///
 /// # Errors
 /// When `share` leaves nothing on one side, or the rest cannot be gridized.
-pub fn held_out(samples: &Samples, options: &GridizeOptions, share: f64) -> Result<Prediction, PredictionError> {
+pub fn held_out(samples: &Samples, options: &GridizeOptions, share: f64) -> Result<Prediction, Error> {
     let (rest, left_out) = samples.split(share);
     if rest.is_empty() || left_out.is_empty() || !share.is_finite() {
-        return Err(PredictionError::Share { share, samples: samples.len() });
+        let samples = samples.len();
+        return Err(error!(
+            "a share of {share} of {samples} samples cannot be held out: it must leave some on both sides"
+        ));
     }
-    predict(&gridize(&rest, options)?.0, &left_out)
+    let (dataset, _) = gridize(&rest, options).map_err(|error| error.within("without the samples held out"))?;
+    predict(&dataset, &left_out)
 }
 
 /// Predicts `samples` by `dataset`, which was not made of them.
 ///
 /// # Errors
 /// When their joints are not the dataset's.
-pub fn predict(dataset: &Dataset, samples: &Samples) -> Result<Prediction, PredictionError> {
-    dataset.grid.check().map_err(PredictionError::Grid)?;
+pub fn predict(dataset: &Dataset, samples: &Samples) -> Result<Prediction, Error> {
+    dataset.grid.check()?;
     let joints = dataset.grid.joints();
     if samples.joints.len() != joints {
-        return Err(PredictionError::Joints { samples: samples.joints.len(), dataset: joints });
+        let found = samples.joints.len();
+        return Err(error!("the samples have {found} joints, the dataset has {joints}"));
     }
     let mut found = Prediction { samples: samples.len(), ..Prediction::default() };
     let (mut squares, mut variances) = (vec![0.0; joints], vec![0.0; joints]);

@@ -1,6 +1,6 @@
 //! Scattered measurements of a contact torque: what a scan or an imported log hands to the gridization.
 
-use crate::{MAX_JOINTS, dataset::JointLabel, names, random::mix};
+use crate::{Error, MAX_AXES, dataset::JointLabel, error, names, random::mix};
 
 /// Scattered configurations q with the contact torque tau measured at each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,43 +13,6 @@ pub struct Samples {
     pub torques: Vec<f64>,
     /// Standard deviation of each torque, laid out alike, where it was measured (N m or N).
     pub deviations: Option<Vec<f64>>,
-}
-
-/// Why measurements cannot be taken as they are.
-#[derive(Debug, thiserror::Error, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum SamplesError {
-    /// No joint, or more than the engine has room for.
-    #[error("the measurements have {0} joints; between 1 and {MAX_JOINTS} can be gridized")]
-    Joints(usize),
-    /// Columns of different lengths.
-    #[error("{what} holds {have} numbers where the configurations hold {need}: every sample needs one a joint")]
-    Length {
-        /// Which column.
-        what: &'static str,
-        /// Its length.
-        have: usize,
-        /// The length of the configurations.
-        need: usize,
-    },
-    /// A name that cannot be printed.
-    #[error("a joint: {0}")]
-    Name(String),
-    /// NaN or an infinity.
-    #[error(
-        "sample {sample} has {what} {value} at joint `{joint}`: remove it, or let the import drop rows that are not \
-         finite"
-    )]
-    NotFinite {
-        /// Number of the sample, from 0.
-        sample: usize,
-        /// Which column.
-        what: &'static str,
-        /// The number, as text.
-        value: String,
-        /// The joint's name.
-        joint: String,
-    },
 }
 
 impl Samples {
@@ -91,28 +54,30 @@ impl Samples {
     /// Checks lengths and that every number is finite.
     ///
     /// # Errors
-    /// [`SamplesError`] names the column and the sample.
-    pub fn check(&self) -> Result<(), SamplesError> {
+    /// The error names the column and the sample.
+    pub fn check(&self) -> Result<(), Error> {
         let joints = self.joints.len();
-        if !(1..=MAX_JOINTS).contains(&joints) {
-            return Err(SamplesError::Joints(joints));
+        if !(1..=MAX_AXES).contains(&joints) {
+            return Err(error!("the measurements have {joints} joints; between 1 and {MAX_AXES} can be gridized"));
         }
-        self.joints.iter().try_for_each(|joint| names::check(&joint.name)).map_err(SamplesError::Name)?;
+        self.joints.iter().try_for_each(|joint| names::check(&joint.name)).map_err(|why| error!("a joint: {why}"))?;
         let need = self.configurations.len() / joints * joints;
         let columns = [("the configuration", Some(&self.configurations)), ("the torque", Some(&self.torques))];
         let deviation = [("the standard deviation", self.deviations.as_ref())];
         for (what, column) in columns.into_iter().chain(deviation) {
             let Some(column) = column else { continue };
             if column.len() != need {
-                return Err(SamplesError::Length { what, have: column.len(), need });
+                let have = column.len();
+                return Err(error!(
+                    "{what} holds {have} numbers where the configurations hold {need}: every sample needs one a joint"
+                ));
             }
             if let Some(entry) = column.iter().position(|value| !value.is_finite()) {
-                return Err(SamplesError::NotFinite {
-                    sample: entry / joints,
-                    what,
-                    value: column[entry].to_string(),
-                    joint: self.joints[entry % joints].name.clone(),
-                });
+                let (sample, value, joint) = (entry / joints, column[entry], &self.joints[entry % joints].name);
+                return Err(error!(
+                    "sample {sample} has {what} {value} at joint `{joint}`: remove it, or let the import drop rows that are \
+                     not finite"
+                ));
             }
         }
         Ok(())

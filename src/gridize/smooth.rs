@@ -8,11 +8,8 @@
 //! with (d + 1) / k for the noise of the plane itself, k neighbours. Exact measurements stay as they are, linear
 //! torques too, and edges keep their height.
 
-use super::{
-    GridizeError,
-    cloud::{Cloud, Position},
-};
-use crate::MAX_JOINTS;
+use super::cloud::{Cloud, Position};
+use crate::{Error, MAX_AXES};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -23,13 +20,13 @@ const PLANE_PIVOT: f64 = 1e-6;
 /// Neighbours a fitted coefficient.
 const NEIGHBOURS_A_COEFFICIENT: usize = 5;
 /// Coefficients of a plane, at most.
-const MOST: usize = MAX_JOINTS + 1;
+const MOST: usize = MAX_AXES + 1;
 
 /// Points by cells of the unit box.
 struct Cells {
     side: f64,
     joints: usize,
-    points: HashMap<[i32; MAX_JOINTS], Vec<u32>>,
+    points: HashMap<[i32; MAX_AXES], Vec<u32>>,
 }
 
 impl Cells {
@@ -44,7 +41,7 @@ impl Cells {
         cells
     }
 
-    fn cell(&self, position: &Position) -> [i32; MAX_JOINTS] {
+    fn cell(&self, position: &Position) -> [i32; MAX_AXES] {
         position.map(|x| (x / self.side).floor() as i32)
     }
 
@@ -71,9 +68,9 @@ impl Cells {
 }
 
 /// Smooths the torques of `cloud`.
-pub(super) fn smooth(cloud: &mut Cloud) -> Result<(), GridizeError> {
+pub(super) fn smooth(cloud: &mut Cloud) -> Result<(), Error> {
     if cloud.variances.is_empty() {
-        return Err(GridizeError::NoDeviations);
+        return Err("smoothing needs the standard deviation of the samples, and none was measured: leave it out".into());
     }
     let joints = cloud.joints;
     let wanted = NEIGHBOURS_A_COEFFICIENT * (joints + 1);

@@ -2,18 +2,17 @@
 
 use super::cloud::JITTER;
 use super::{
-    GridizeError,
     cloud::{Cloud, Position},
     interpolant::{Simplex, Triangulation},
     tetrahedra::Tetrahedra,
 };
-use crate::MAX_JOINTS;
+use crate::{Error, MAX_AXES};
 
 /// Tetrahedra of the jittered points of a cloud.
 pub(super) struct Space(Tetrahedra);
 
 impl Space {
-    pub fn new(cloud: &Cloud) -> Result<Self, GridizeError> {
+    pub fn new(cloud: &Cloud) -> Result<Self, Error> {
         Tetrahedra::new(cloud.jittered(JITTER), &cloud.spanning).map(Self)
     }
 }
@@ -27,7 +26,7 @@ impl Triangulation for Space {
 
     fn simplex(&self, hint: &mut u32, at: &Position) -> Option<Simplex> {
         let vertices = self.0.locate(at, hint)?;
-        let mut simplex = [0; MAX_JOINTS + 1];
+        let mut simplex = [0; MAX_AXES + 1];
         simplex[..4].copy_from_slice(&vertices);
         Some(simplex)
     }

@@ -199,10 +199,8 @@ fn flat_clouds_are_refused_with_the_reason() {
     let line: Vec<Vec<f64>> = (0..50).map(|i| vec![f64::from(i), 2.0 * f64::from(i), 0.5 * f64::from(i)]).collect();
     let plane: Vec<Vec<f64>> = random_points(50, 2, 1).into_iter().map(|q| vec![q[0], q[1], q[0] - q[1]]).collect();
     for (points, rank) in [(line, 1), (plane, 2)] {
-        match gridize(&samples(&points, linear_field), &options(0.1)) {
-            Err(GridizeError::Flat { rank: found, joints: 3, .. }) => assert_eq!(found, rank),
-            other => panic!("{:?}", other.map(|(_, report)| report)),
-        }
+        let refused = gridize(&samples(&points, linear_field), &options(0.1)).err().unwrap().to_string();
+        assert!(refused.starts_with(&format!("the samples span only {rank} of 3 joint directions")), "{refused}");
     }
     let still: Vec<Vec<f64>> = random_points(50, 2, 1).into_iter().map(|q| vec![q[0], 0.25]).collect();
     let error = gridize(&samples(&still, linear_field), &options(0.1)).err().unwrap().to_string();
@@ -321,5 +319,5 @@ fn smoothing_removes_noise_of_the_measured_size_and_leaves_the_rest() {
     let unchanged = gridize(&noisy, &smooth).unwrap().0;
     assert!(unchanged.torque[..] == rough.torque[..]);
     noisy.deviations = None;
-    assert!(matches!(gridize(&noisy, &smooth), Err(GridizeError::NoDeviations)));
+    assert!(gridize(&noisy, &smooth).err().unwrap().to_string().contains("none was measured"));
 }

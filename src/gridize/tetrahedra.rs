@@ -6,7 +6,8 @@
 //! holds it; its boundary facets, joined with the point, fill it again. Predicates decide by their exact sign
 //! (`robust`), so the cavity is star-shaped and no tetrahedron is ever inverted.
 
-use super::{GridizeError, cloud::Position, order::insertion_order};
+use super::{cloud::Position, order::insertion_order};
+use crate::{Error, error};
 use robust::{Coord3D, insphere, orient3d};
 
 /// Simplices that may be created per point before an arrangement is called degenerate. Random points create about 27
@@ -46,7 +47,7 @@ struct Work {
 
 impl Tetrahedra {
     /// Tetrahedralises `points`; `spanning` are four of them that span a volume.
-    pub fn new(points: Vec<Position>, spanning: &[u32]) -> Result<Self, GridizeError> {
+    pub fn new(points: Vec<Position>, spanning: &[u32]) -> Result<Self, Error> {
         let mut first = [spanning[0], spanning[1], spanning[2], spanning[3]];
         let order = insertion_order(&points);
         let mut mesh = Self { points, vertices: Vec::new(), neighbours: Vec::new(), last: 0 };
@@ -70,7 +71,11 @@ impl Tetrahedra {
             }
             mesh.insert(point, &mut work);
             if work.created > limit {
-                return Err(GridizeError::TooManySimplices { points: mesh.points.len(), limit });
+                let points = mesh.points.len();
+                return Err(error!(
+                    "triangulating {points} samples passed the limit of {limit} simplices: their arrangement is degenerate \
+                     (two skew lines, say); decimate them"
+                ));
             }
         }
         Ok(mesh)

@@ -4,15 +4,15 @@
 //! it lasted, and the spread of the means over visits is the repeatability of the measurement: what a second pass
 //! over the same place would give.
 
-use super::{ImportError, mapping::Keep};
-use crate::{JointVector, MAX_JOINTS, dataset::JointLabel, gridize::Samples};
+use super::mapping::Keep;
+use crate::{Error, JointVector, MAX_AXES, dataset::JointLabel, error, gridize::Samples};
 use std::collections::BTreeMap;
 
 /// Cells of C-space that an import averages in: about 1 kB each.
 const IMPORT_CELLS: usize = 1_000_000;
 
 /// Cell number on each axis.
-type Key = [i64; MAX_JOINTS];
+type Key = [i64; MAX_AXES];
 
 /// Direction of motion of the lead joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,15 +94,15 @@ impl Cells {
     }
 
     /// Adds a row.
-    pub fn add(&mut self, q: &JointVector, torque: &JointVector, direction: Direction) -> Result<(), ImportError> {
-        let mut key = [0; MAX_JOINTS];
+    pub fn add(&mut self, q: &JointVector, torque: &JointVector, direction: Direction) -> Result<(), Error> {
+        let mut key = [0; MAX_AXES];
         for (k, (x, side)) in key.iter_mut().zip(q.iter().zip(&self.sides)) {
             *k = (x / side).floor() as i64;
         }
         if self.visit.as_ref().is_none_or(|visit| visit.key != key || visit.direction != direction) {
             self.end_visit();
             if self.cells.len() > IMPORT_CELLS {
-                return Err(ImportError::TooManyCells { limit: IMPORT_CELLS });
+                return Err(error!("more than {IMPORT_CELLS} cells of C-space were visited: enlarge torque.cell"));
             }
             let empty = Mean::new(self.joints);
             self.visit = Some(Visit { key, direction, q: empty, torque: empty });

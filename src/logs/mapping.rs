@@ -3,6 +3,7 @@
 
 use super::units::ColumnUnit;
 use crate::{
+    Error,
     dataset::JointLabel,
     scene::{self, Diagnostic},
 };
@@ -226,41 +227,23 @@ const fn unlimited() -> f64 {
 /// The unit of angles.
 const RADIANS: &str = "rad";
 
-/// Why a mapping was refused.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MappingError {
-    /// The file cannot be read.
-    #[error("{file}: cannot be read: {reason}")]
-    Read {
-        /// The file.
-        file: String,
-        /// Why, and what to do.
-        reason: String,
-    },
-    /// Not TOML, an unknown key, a wrong type, or a value that cannot be.
-    #[error(transparent)]
-    Invalid(Box<Diagnostic>),
-}
-
 impl Mapping {
     /// Reads and validates a mapping file.
     ///
     /// # Errors
-    /// [`MappingError`] names the file, the line and the key.
-    pub fn load(path: &Path) -> Result<Self, MappingError> {
-        let text = scene::text::read(path)
-            .map_err(|reason| MappingError::Read { file: path.display().to_string(), reason })?;
+    /// The error names the file, the line and the key.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let unreadable = |reason| Error::at(path, format_args!("cannot be read: {reason}"));
+        let text = scene::text::read(path).map_err(unreadable)?;
         Self::parse(&text, path)
     }
 
     /// Validates `text`, the content of the file at `path`, which errors name.
     ///
     /// # Errors
-    /// [`MappingError`] names the file, the line and the key.
-    pub fn parse(text: &str, path: &Path) -> Result<Self, MappingError> {
-        let invalid =
-            |place, message: &str| MappingError::Invalid(Box::new(Diagnostic::new(path, text, place, message)));
+    /// The error names the file, the line and the key.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
+        let invalid = |place, message: &str| Error::new(Diagnostic::new(path, text, place, message).to_string());
         let mut mapping: Self =
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
         for joint in mapping.joints.iter_mut().filter(|joint| joint.unit.is_empty()) {

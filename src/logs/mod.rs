@@ -18,17 +18,14 @@ mod units;
 mod window;
 
 pub use cells::CellReport;
-pub use mapping::{
-    BadRows, ColumnName, Effort, Filter, Joint, Keep, Mapping, MappingError, Quantity, Table, Time, Torque,
-};
+pub use mapping::{BadRows, ColumnName, Effort, Filter, Joint, Keep, Mapping, Quantity, Table, Time, Torque};
 pub use units::ColumnUnit;
 
 use crate::{
-    JointVector,
-    csv::TableError,
+    Error, JointVector, error,
     gridize::{ForceHistory, Samples},
     input,
-    ros::{JointStateTable, RosError, is_mcap},
+    ros::{JointStateTable, is_mcap},
 };
 use cells::{Cells, Direction};
 use rows::{ReadRowResult, Row, Rows};
@@ -41,45 +38,6 @@ use window::{Seen, Window};
 
 /// Samples that an import keeps when it averages none: 0.5 GB for six joints.
 const IMPORT_SAMPLES: usize = 5_000_000;
-
-/// Why a log was refused.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ImportError {
-    /// The file cannot be read, or a line of it cannot be used.
-    #[error(transparent)]
-    Table(TableError),
-    /// Every row would be a sample.
-    #[error("more than {limit} samples: set filter.decimate, or average rows in cells (torque.keep and torque.cell)")]
-    TooManySamples {
-        /// The limit.
-        limit: usize,
-    },
-    /// Cells too small.
-    #[error("more than {limit} cells of C-space were visited: enlarge torque.cell")]
-    TooManyCells {
-        /// The limit.
-        limit: usize,
-    },
-    /// Most rows are of no use.
-    #[error("{dropped} of {rows} rows cannot be used ({listed}): {remedy}")]
-    MostDropped {
-        /// Rows that cannot be used.
-        dropped: u64,
-        /// Rows read.
-        rows: u64,
-        /// How many for which reason, and where first.
-        listed: String,
-        /// What to do, in words.
-        remedy: String,
-    },
-    /// An MCAP file that cannot be read.
-    #[error(transparent)]
-    Ros(#[from] RosError),
-    /// Nothing left.
-    #[error("no row was kept: {0}")]
-    Nothing(String),
-}
 
 /// Why a row was left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
@@ -108,19 +66,6 @@ pub struct Dropped {
     pub rows: u64,
     /// File and line of the first.
     pub first: String,
-}
-
-impl From<TableError> for ImportError {
-    /// What went wrong in a table of joint states is what went wrong in their file.
-    fn from(error: TableError) -> Self {
-        match error {
-            TableError::Read { file, source } => match source.downcast::<RosError>() {
-                Ok(error) => Self::Ros(error),
-                Err(source) => Self::Table(TableError::Read { file, source }),
-            },
-            other => Self::Table(other),
-        }
-    }
 }
 
 impl fmt::Display for Dropped {
@@ -190,12 +135,12 @@ pub struct ImportProgress {
 /// Reads the logs `files` through `mapping`, one after another. `progress` is called now and then.
 ///
 /// # Errors
-/// [`ImportError`] names the file and the line.
+/// The error names the file and the line.
 pub fn import(
     mapping: &Mapping,
     files: &[PathBuf],
     progress: &mut dyn FnMut(ImportProgress),
-) -> Result<Imported, ImportError> {
+) -> Result<Imported, Error> {
     let of_robot = files.iter().any(|file| is_mcap(file));
     let mapping = &if of_robot { mapping.for_joint_states() } else { mapping.clone() };
     let mut import = Import::new(mapping);
@@ -205,7 +150,7 @@ pub fn import(
         let opened: Box<dyn Read> = if of_robot {
             Box::new(JointStateTable::open(path, mapping.table.topic.as_deref())?)
         } else {
-            Box::new(input::open(path).map_err(|source| TableError::Read { file: path.clone(), source })?)
+            Box::new(input::open(path).map_err(|source| Error::unreadable(path, &source))?)
         };
         bytes += import.read(BufReader::with_capacity(1 << 16, opened), &file, &mut |read, rows| {
             progress(ImportProgress { bytes: bytes + read, rows });
@@ -288,12 +233,7 @@ impl<'a> Import<'a> {
     }
 
     /// Reads one log; returns its length in bytes.
-    fn read(
-        &mut self,
-        reader: impl BufRead,
-        file: &str,
-        progress: &mut dyn FnMut(u64, u64),
-    ) -> Result<u64, ImportError> {
+    fn read(&mut self, reader: impl BufRead, file: &str, progress: &mut dyn FnMut(u64, u64)) -> Result<u64, Error> {
         const ROWS_A_REPORT: u64 = 1 << 14;
         let mapping = self.mapping;
         let mut rows = Rows::new(mapping, reader, file);
@@ -326,7 +266,7 @@ impl<'a> Import<'a> {
         }
     }
 
-    fn take(&mut self, row: Row, file: &str) -> Result<(), ImportError> {
+    fn take(&mut self, row: Row, file: &str) -> Result<(), Error> {
         if row.first {
             self.end_segment(file)?;
         }
@@ -336,7 +276,7 @@ impl<'a> Import<'a> {
         }
     }
 
-    fn end_segment(&mut self, file: &str) -> Result<(), ImportError> {
+    fn end_segment(&mut self, file: &str) -> Result<(), Error> {
         while let Some(seen) = self.window.flush() {
             self.keep(&seen, file)?;
         }
@@ -348,7 +288,7 @@ impl<'a> Import<'a> {
         Ok(())
     }
 
-    fn keep(&mut self, seen: &Seen, file: &str) -> Result<(), ImportError> {
+    fn keep(&mut self, seen: &Seen, file: &str) -> Result<(), Error> {
         if seen.outlier {
             self.drop_row(Reason::Outlier, file, seen.row.line);
             return Ok(());
@@ -358,7 +298,7 @@ impl<'a> Import<'a> {
     }
 
     /// Hands the averaged block on: as a sample, or to its cell.
-    fn end_block(&mut self) -> Result<(), ImportError> {
+    fn end_block(&mut self) -> Result<(), Error> {
         let block = std::mem::replace(&mut self.block, Block::new(self.mapping.joints.len()));
         if block.count == 0 {
             return Ok(());
@@ -370,7 +310,10 @@ impl<'a> Import<'a> {
         match keep {
             Keep::All => {
                 if self.samples.len() >= IMPORT_SAMPLES {
-                    return Err(ImportError::TooManySamples { limit: IMPORT_SAMPLES });
+                    return Err(error!(
+                        "more than {IMPORT_SAMPLES} samples: set filter.decimate, or average rows in cells (torque.keep \
+                         and torque.cell)"
+                    ));
                 }
                 self.samples.configurations.extend_from_slice(&block.q);
                 self.samples.torques.extend_from_slice(&block.torque);
@@ -394,19 +337,15 @@ impl<'a> Import<'a> {
     }
 
     /// `of_robot`: rows are messages.
-    fn finish(mut self, of_robot: bool) -> Result<Imported, ImportError> {
+    fn finish(mut self, of_robot: bool) -> Result<Imported, Error> {
         let is_sound = |reason| matches!(reason, Reason::Absent | Reason::RepeatedTime | Reason::Outlier);
         let broken = |dropped: &&Dropped| !is_sound(dropped.reason);
         let dropped: u64 = self.report.dropped.iter().filter(broken).map(|dropped| dropped.rows).sum();
         let most = self.report.dropped.iter().filter(broken).max_by_key(|dropped| dropped.rows);
         if let Some(most) = most.filter(|_| 2 * dropped > self.report.rows) {
             let remedy = remedy(most.reason, of_robot, self.mapping);
-            return Err(ImportError::MostDropped {
-                dropped,
-                rows: self.report.rows,
-                listed: self.report.left_out(),
-                remedy,
-            });
+            let (rows, listed) = (self.report.rows, self.report.left_out());
+            return Err(error!("{dropped} of {rows} rows cannot be used ({listed}): {remedy}"));
         }
         let keep = self.mapping.torque.keep;
         let mut branches = None;
@@ -419,11 +358,11 @@ impl<'a> Import<'a> {
         }
         self.report.samples = self.samples.len();
         if self.samples.is_empty() {
-            return Err(ImportError::Nothing(format!(
-                "{} rows were read ({}); see torque.keep, torque.still and torque.cell in the mapping",
+            return Err(error!(
+                "no row was kept: {} rows were read ({}); see torque.keep, torque.still and torque.cell in the mapping",
                 self.report.rows,
                 self.report.left_out()
-            )));
+            ));
         }
         self.histories.retain(|history| !history.times.is_empty());
         Ok(Imported { samples: self.samples, branches, histories: self.histories, report: self.report })

@@ -1,12 +1,12 @@
 //! Rows of a log, read one at a time: line numbers kept, nothing of the text held but one line.
 
 use super::{
-    ImportError, Reason,
+    Reason,
     mapping::{BadRows, ColumnName, Mapping, Quantity},
     units::ColumnUnit,
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     csv::{Lines, fields},
 };
 use std::{io::BufRead, path::Path};
@@ -68,7 +68,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// The next row, or why a line was left out.
-    pub fn next(&mut self) -> Result<ReadRowResult, ImportError> {
+    pub fn next(&mut self) -> Result<ReadRowResult, Error> {
         let mut line = std::mem::take(&mut self.text);
         while let Some(text) = self.lines.next(&mut line)? {
             let text = text.trim_ascii_end();
@@ -84,12 +84,12 @@ impl<'a, R: BufRead> Rows<'a, R> {
         Ok(ReadRowResult::End)
     }
 
-    fn error(&self, message: String) -> ImportError {
-        self.lines.error(message).into()
+    fn error(&self, message: String) -> Error {
+        self.lines.error(message)
     }
 
     /// Parses a line that is no comment; `None` for the header.
-    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRowResult>, ImportError> {
+    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRowResult>, Error> {
         let delimiter = self.mapping.table.delimiter;
         let Ok(text) = std::str::from_utf8(text) else {
             if self.layout.is_none() {
@@ -110,10 +110,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
             self.layout = Some(self.layout(&names)?);
             return if self.mapping.table.header { Ok(None) } else { self.line_outcome(text.as_bytes()) };
         };
-        let mut found = [0.0; 2 * crate::MAX_JOINTS + 1];
+        let mut found = [0.0; 2 * crate::MAX_AXES + 1];
         let joints = layout.positions.len();
         let wanted = layout.time.iter().chain(&layout.positions).chain(&layout.torques);
-        let mut slots = [usize::MAX; 2 * crate::MAX_JOINTS + 1];
+        let mut slots = [usize::MAX; 2 * crate::MAX_AXES + 1];
         slots.iter_mut().zip(wanted).for_each(|(slot, column)| *slot = *column);
         let mut columns = 0;
         let mut bad: Option<(usize, &str)> = None;
@@ -150,7 +150,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// Places a row in time: repeated stamps are left out, going back is refused, a long pause begins a segment.
-    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<ReadRowResult, ImportError> {
+    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<ReadRowResult, Error> {
         let period = self.mapping.time.period.unwrap_or(0.0);
         let time = stamp.unwrap_or(self.count as f64 * period);
         let mut first = self.last_time.is_none();
@@ -169,7 +169,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
         Ok(ReadRowResult::Row(Row { first, line: self.lines.number, time, q, torque }))
     }
 
-    fn refuse(&self, reason: Reason, message: String) -> Result<ReadRowResult, ImportError> {
+    fn refuse(&self, reason: Reason, message: String) -> Result<ReadRowResult, Error> {
         match self.mapping.table.bad_rows {
             BadRows::Drop => Ok(ReadRowResult::Dropped(reason)),
             BadRows::Refuse => Err(self.error(format!("{message}; `bad_rows = \"drop\"` would leave the row out"))),
@@ -185,7 +185,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
         if comma_number { " (decimals seem to be commas: set `decimal = \",\"`)" } else { "" }
     }
 
-    fn layout(&self, names: &[&str]) -> Result<Layout, ImportError> {
+    fn layout(&self, names: &[&str]) -> Result<Layout, Error> {
         let columns = self.mapping.table.columns.unwrap_or(names.len());
         let find = |column: &ColumnName| match column {
             ColumnName::Number(number) if *number <= columns => Ok(number - 1),

@@ -11,7 +11,7 @@ position = { column = 2 }
 torque = { column = 3 }
 "#;
 
-fn read(mapping: &str, log: &str) -> Result<(Samples, ImportReport), ImportError> {
+fn read(mapping: &str, log: &str) -> Result<(Samples, ImportReport), crate::Error> {
     let mapping = Mapping::parse(mapping, Path::new("map.toml")).unwrap();
     let mut import = Import::new(&mapping);
     import.read(log.as_bytes(), "log.csv", &mut |_, _| {})?;

@@ -1,6 +1,6 @@
 //! Nodes, surface and tetrahedra of an object: what a mesh file or a dataset holds of it.
 
-use super::ObjectError;
+use crate::{Error, error};
 use glam::DVec3;
 
 /// The geometry of an object at rest, its surface nodes first.
@@ -29,19 +29,31 @@ impl Body {
     }
 
     /// Refuses node numbers that are out of range. Those of the triangles are checked with the surface.
-    pub(super) fn check(&self) -> Result<(), ObjectError> {
+    pub(super) fn check(&self) -> Result<(), Error> {
         let count = self.nodes.len();
         let wild = |corners: &&[u32; 4]| corners.iter().any(|&corner| corner as usize >= count);
         let is_wild = self.mid_nodes.as_flattened().iter().any(|&node| node as usize >= count);
         if is_wild || !self.mid_nodes.is_empty() && self.mid_nodes.len() != self.tetrahedra.len() {
-            return Err(ObjectError::MidNodes { tetrahedra: self.tetrahedra.len(), count });
+            return Err(error!(
+                "the nodes in the middles of edges do not fit {} tetrahedra and {count} nodes: build the object again \
+                 from its scene",
+                self.tetrahedra.len()
+            ));
         }
         if !self.regions.is_empty() && self.regions.len() != self.tetrahedra.len() {
-            return Err(ObjectError::Regions { regions: self.regions.len(), tetrahedra: self.tetrahedra.len() });
+            let (regions, tetrahedra) = (self.regions.len(), self.tetrahedra.len());
+            return Err(error!(
+                "there are {regions} regions for {tetrahedra} tetrahedra: build the object again from its scene"
+            ));
         }
         match self.tetrahedra.iter().find(wild) {
-            Some(corners) => Err(ObjectError::TetrahedronNode { corners: *corners, count }),
-            None if self.surface_nodes > count => Err(ObjectError::SurfaceNodes { surface: self.surface_nodes, count }),
+            Some(corners) => Err(error!(
+                "a tetrahedron has the nodes {corners:?}, of {count}: build the object again from its scene"
+            )),
+            None if self.surface_nodes > count => Err(error!(
+                "{} of {count} nodes are on the surface: build the object again from its scene",
+                self.surface_nodes
+            )),
             None => Ok(()),
         }
     }

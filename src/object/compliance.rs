@@ -7,8 +7,8 @@
 //! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of
 //! nodes is all there is to store and to multiply with, instead of nine.
 
-use super::{Attachment, Factor, Object, ObjectError};
-use crate::memory;
+use super::{Attachment, Factor, Object};
+use crate::{Error, error, memory};
 use glam::{DMat3, DVec3};
 
 /// Dense symmetric matrix over R covered surface nodes (m/N).
@@ -44,7 +44,7 @@ impl Compliance {
     ///
     /// # Errors
     /// When it would not fit in memory; nothing has been allocated then.
-    pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, ObjectError> {
+    pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, Error> {
         Self::check(object, nodes.len())?;
         Ok(Self::of(&object.factor, &object.attachment, object.surface_nodes, nodes))
     }
@@ -53,7 +53,7 @@ impl Compliance {
     ///
     /// # Errors
     /// When it would not.
-    pub fn check(object: &Object, nodes: usize) -> Result<(), ObjectError> {
+    pub fn check(object: &Object, nodes: usize) -> Result<(), Error> {
         let order = nodes.saturating_mul(object.factor.rows_per_node());
         let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
         if bytes <= memory::SMALL {
@@ -61,7 +61,12 @@ impl Compliance {
         }
         let limit = memory::left().map_or(MAX_BYTES, |left| left.min(MAX_BYTES));
         if bytes > limit {
-            return Err(ObjectError::TooLarge { nodes, bytes, limit });
+            let [needed, limit] = [bytes.div_ceil(1_000_000), limit / 1_000_000];
+            return Err(error!(
+                "the proxy reaches {nodes} surface nodes, which need {needed} MB of compliance, more than the {limit} MB of \
+                 memory that it may take: use a coarser surface or a smaller grid, close other programs, or raise the \
+                 limit (ulimit -v)"
+            ));
         }
         Ok(())
     }
@@ -192,6 +197,6 @@ mod tests {
         Factor::of(&stiffness, 0.25, &diagonal).unwrap().solve(&mut vectors);
         assert!(vectors.iter().zip(&solution).all(|(a, b)| (*a - *b).length() < 1e-13));
         let indefinite = Factor::of(&stiffness, 1.0, &[-100.0; 6]);
-        assert_eq!(indefinite.unwrap_err(), crate::object::FactorError::NotPositiveDefinite);
+        assert_eq!(indefinite.unwrap_err().kind(), crate::ErrorKind::Indefinite);
     }
 }

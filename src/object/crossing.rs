@@ -8,15 +8,14 @@
 //!
 //! Pairs of triangles whose boxes overlap are found by a sweep along the longest axis of the surface.
 
-use super::SurfaceDefect;
 use glam::DVec3;
 use robust::{Coord3D, orient3d};
 
 /// Refuses a surface of which an edge meets a triangle that it shares no node with.
 ///
 /// # Errors
-/// [`SurfaceDefect::Crossing`], for the pair that the sweep finds first.
-pub(super) fn check(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), SurfaceDefect> {
+/// Names the pair and its place, for the one that the sweep finds first.
+pub(super) fn check(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     let corners = |t: u32| triangles[t as usize].map(|node| nodes[node as usize]);
     let low = nodes.iter().copied().fold(DVec3::MAX, DVec3::min);
     let high = nodes.iter().copied().fold(DVec3::MIN, DVec3::max);
@@ -40,7 +39,11 @@ pub(super) fn check(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), Surfa
             }
             let (one, other) = (triangles[s as usize], triangles[t as usize]);
             if let Some(place) = meeting(nodes, one, other).or_else(|| meeting(nodes, other, one)) {
-                return Err(SurfaceDefect::Crossing { triangles: [s.min(t), s.max(t)], place });
+                let ([one, other], [x, y, z]) = ([s.min(t), s.max(t)], place.to_array());
+                return Err(format!(
+                    "the surface crosses or touches itself: triangles {one} and {other} meet near ({x:.4}, {y:.4}, {z:.4}) \
+                     m: part the pieces, or join them into one surface (a boolean union in Blender or MeshLab)"
+                ));
             }
         }
         active.push(t);
@@ -102,11 +105,7 @@ mod tests {
     }
 
     fn crosses((nodes, triangles): &Surface) -> bool {
-        match check(nodes, triangles) {
-            Ok(()) => false,
-            Err(SurfaceDefect::Crossing { .. }) => true,
-            Err(other) => panic!("{other}"),
-        }
+        check(nodes, triangles).is_err()
     }
 
     /// Two balls of radius 1 at many distances: they cross between nested and apart, also where nodes and edges meet
@@ -138,11 +137,12 @@ mod tests {
         nodes[top].z = 0.0;
         assert!(check(&nodes, &triangles).is_ok(), "a dent is no crossing");
         nodes[top].z = -0.08;
-        let Err(SurfaceDefect::Crossing { triangles: [one, other], place }) = check(&nodes, &triangles) else {
-            panic!("the cap leaves through the bottom")
-        };
-        assert!(triangles[one as usize].contains(&(top as u32)) != triangles[other as usize].contains(&(top as u32)));
-        assert!(place.length() < 0.1);
+        let text = check(&nodes, &triangles).unwrap_err();
+        let numbers = text.split(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-')));
+        let numbers: Vec<f64> = numbers.filter_map(|number| number.parse().ok()).collect();
+        let has_top = |number: f64| triangles[number as usize].contains(&(top as u32));
+        assert!(has_top(numbers[0]) != has_top(numbers[1]), "the cap leaves through the bottom: {text}");
+        assert!(DVec3::new(numbers[2], numbers[3], numbers[4]).length() < 0.1, "{text}");
     }
 
     /// Segments and triangles in general position against barycentric coordinates in floating point.

@@ -10,11 +10,11 @@
 //! and named by the node that it moves most.
 
 use super::{
-    ObjectError, Stiffness,
+    Stiffness,
     condensation::condense,
     substitution::{Partition, Supernodes, substitute},
 };
-use crate::memory;
+use crate::{Error, ErrorKind, error, memory};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::solvers::LltError;
 use faer::perm::PermRef;
@@ -37,18 +37,6 @@ const MIN_RECIPROCAL_CONDITION: f64 = f64::EPSILON / 1e-6;
 /// counts.
 const MECHANISM_SHIFT: f64 = 1.5e-8;
 
-/// A factorisation failed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FactorError {
-    /// A pivot is not positive.
-    #[error("the matrix of the object is not positive definite")]
-    NotPositiveDefinite,
-    /// There is no memory for the factor, or it has too many entries to count.
-    #[error("the matrix of the object cannot be factorised: {0}")]
-    Resources(String),
-}
-
 /// Cholesky factor of a symmetric positive definite matrix over the 3N node coordinates.
 #[derive(Clone, Debug)]
 pub struct Factor {
@@ -66,8 +54,9 @@ impl Factor {
     ///
     /// # Errors
     /// When the matrix is not positive definite, or there is no memory for its factor.
-    pub fn of(stiffness: &Stiffness, alpha: f64, diagonal: &[f64]) -> Result<Self, FactorError> {
-        let resources = |reason: &dyn std::fmt::Display| FactorError::Resources(reason.to_string());
+    pub fn of(stiffness: &Stiffness, alpha: f64, diagonal: &[f64]) -> Result<Self, Error> {
+        let resources =
+            |reason: &dyn std::fmt::Display| error!("the matrix of the object cannot be factorised: {reason}");
         let rows_per_node = if stiffness.is_isotropic() { 1 } else { 3 };
         let matrix = lower_half(stiffness, alpha, diagonal, rows_per_node);
         let rows = |&node: &u32| (0..rows_per_node).map(move |a| rows_per_node * node as usize + a);
@@ -111,7 +100,9 @@ impl Factor {
                 supernodes: Arc::new(supernodes),
                 values: Arc::new(values),
             }),
-            Err(LltError::NonPositivePivot { .. }) => Err(FactorError::NotPositiveDefinite),
+            Err(LltError::NonPositivePivot { .. }) => {
+                Err(error!("the matrix of the object is not positive definite").of(ErrorKind::Indefinite))
+            }
         }
     }
 
@@ -181,7 +172,7 @@ fn lower_half(stiffness: &Stiffness, alpha: f64, diagonal: &[f64], rows_per_node
 }
 
 /// The factor of K, or the reason why K is not positive definite to working precision.
-pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, ObjectError> {
+pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, Error> {
     let mut diagonal = stiffness.diagonal();
     let largest = diagonal.iter().copied().fold(0.0, f64::max);
     // A node without any spring.
@@ -196,13 +187,13 @@ pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, O
             }
             Ok(factor)
         }
-        Err(FactorError::NotPositiveDefinite) => {
+        Err(error) if error.kind() == ErrorKind::Indefinite => {
             let shifts: Vec<f64> = diagonal.iter().map(|own| MECHANISM_SHIFT * own).collect();
             let shifted = Factor::of(stiffness, 1.0, &shifts)?;
             let (smallest, softest) = softest_mode(&shifted, &roots);
             Err(mechanism(&softest, (smallest - MECHANISM_SHIFT).max(0.0) / norm))
         }
-        Err(error) => Err(error.into()),
+        Err(error) => Err(error),
     }
 }
 
@@ -239,10 +230,15 @@ fn norm(vectors: &[DVec3]) -> f64 {
 }
 
 /// The error that names the node which moves most in `mode`.
-fn mechanism(mode: &[DVec3], reciprocal_condition: f64) -> ObjectError {
+fn mechanism(mode: &[DVec3], reciprocal_condition: f64) -> Error {
     let largest = mode.iter().enumerate().max_by(|a, b| a.1.length_squared().total_cmp(&b.1.length_squared()));
     let (node, motion) = largest.map_or((0, DVec3::ZERO), |(node, motion)| (node, *motion));
-    ObjectError::Mechanism { node: node as u32, direction: motion.normalize_or_zero(), reciprocal_condition }
+    let [x, y, z] = motion.normalize_or_zero().to_array();
+    error!(
+        "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): node {node} can move \
+         along ({x:.2}, {y:.2}, {z:.2}) almost without force; axial springs leave such mechanisms, and a skin on sliver \
+         triangles comes near them: ground more nodes, stiffen the ground, use isotropic springs, or mesh evenly"
+    )
 }
 
 #[cfg(test)]

@@ -4,10 +4,13 @@
 //! body. A clamp is springs per area so stiff that they hardly give way. All act on the displacement of the surface,
 //! or of the solid, as the nodes of K move it.
 
+use super::Stiffness;
 use super::attachment::{Attachment, SurfacePoint};
 use super::solid::Elements;
-use super::{ObjectError, Stiffness};
-use crate::scene::{GroundNodes, GroundSpec, GroundStiffness};
+use crate::{
+    Error, error,
+    scene::{GroundNodes, GroundSpec, GroundStiffness},
+};
 use glam::{DMat3, DVec3};
 use std::collections::BTreeMap;
 
@@ -27,14 +30,17 @@ pub(super) struct Held<'a> {
 }
 
 /// Per node: is it grounded?
-pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, ObjectError> {
+pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, Error> {
     match &ground.nodes {
         GroundNodes::All => Ok(vec![true; nodes.len()]),
         GroundNodes::Listed(list) => {
             let mut grounded = vec![false; nodes.len()];
             for &node in list {
                 let slot = grounded.get_mut(node as usize);
-                *slot.ok_or(ObjectError::GroundNode { node, count: nodes.len() })? = true;
+                let last = nodes.len().saturating_sub(1);
+                *slot.ok_or_else(|| {
+                    error!("ground names node {node}, but the object has nodes 0 to {last}: correct the list")
+                })? = true;
             }
             Ok(grounded)
         }
@@ -42,7 +48,9 @@ pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, 
             let grounded: Vec<bool> = nodes.iter().map(|n| n.z < *height).collect();
             if !grounded.contains(&true) {
                 let lowest = nodes.iter().map(|n| n.z).fold(f64::INFINITY, f64::min);
-                return Err(ObjectError::NothingBelow { height: *height, lowest });
+                return Err(error!(
+                    "no node lies below z = {height} m, the lowest is at z = {lowest} m: raise the ground's height"
+                ));
             }
             Ok(grounded)
         }
@@ -115,10 +123,14 @@ fn add_element(nodes: &[u32], products: &[f64], k: f64, stiffness: &mut Stiffnes
 
 /// Refuses an object of which a connected part has no grounded node. `components`: nodes of each part; `grounded`: per
 /// node, empty where there is no ground.
-pub(super) fn check_components(components: &[Vec<u32>], grounded: &[bool]) -> Result<(), ObjectError> {
+pub(super) fn check_components(components: &[Vec<u32>], grounded: &[bool]) -> Result<(), Error> {
     for part in components {
         if !part.iter().any(|&node| grounded.get(node as usize) == Some(&true)) {
-            return Err(ObjectError::Ungrounded { node: part[0], nodes: part.len() });
+            let (node, nodes) = (part[0], part.len());
+            return Err(error!(
+                "the ground holds no node of the part of {nodes} nodes around node {node}, which would float away: ground \
+                 at least one of its nodes, or give the skin a foundation"
+            ));
         }
     }
     Ok(())

@@ -5,7 +5,8 @@
 //! on an edge this is the point at equal arcs. The longest edge is then 1.2 times the shortest, on every mesh. There
 //! are 10 n^2 + 2 nodes and 20 n^2 triangles.
 
-use super::ObjectError;
+use super::out_of_range;
+use crate::Error;
 use glam::DVec3;
 use std::collections::HashMap;
 
@@ -34,16 +35,12 @@ const FACES: [[u32; 3]; 20] = [
 ];
 
 /// Returns the nodes and outward triangles of a sphere. `divisions`: parts of each edge of the icosahedron.
-pub(crate) fn generate(
-    centre: DVec3,
-    radius: f64,
-    divisions: usize,
-) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), ObjectError> {
+pub(crate) fn generate(centre: DVec3, radius: f64, divisions: usize) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), Error> {
     if !(radius > 0.0 && radius.is_finite()) {
-        return Err(ObjectError::Parameter { name: "radius", value: radius, range: "positive and finite" });
+        return Err(out_of_range("radius", radius, "positive and finite"));
     }
     if divisions < 1 {
-        return Err(ObjectError::Parameter { name: "number of divisions", value: 0.0, range: "at least 1" });
+        return Err(out_of_range("number of divisions", 0.0, "at least 1"));
     }
     let corners = corners();
     let angle = 0.2f64.sqrt().acos();

@@ -6,9 +6,11 @@
 //! and bulk modulus over it, as layers in series have (Reuss 1929). Measured against meshes that fit:
 //! `docs/solids.md`.
 
-use super::ObjectError;
 use super::element::Lame;
-use crate::scene::{ElasticSpec, InclusionPlace};
+use crate::{
+    Error, error,
+    scene::{ElasticSpec, InclusionPlace},
+};
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -91,11 +93,13 @@ impl<'a> Materials<'a> {
     /// Refuses inclusions that hold no part of the solid.
     ///
     /// # Errors
-    /// [`ObjectError::EmptyInclusion`].
-    pub fn check(&self) -> Result<(), ObjectError> {
+    /// Names the first one.
+    pub fn check(&self) -> Result<(), Error> {
         let mut found = self.elastic.inclusions.iter().zip(&self.found[1..]);
         match found.find(|(_, found)| !found.load(Ordering::Relaxed)) {
-            Some((inclusion, _)) => Err(ObjectError::EmptyInclusion { inclusion: inclusion.to_string() }),
+            Some((inclusion, _)) => {
+                Err(error!("no part of the solid is in the inclusion ({inclusion}): correct its place, or remove it"))
+            }
             None => Ok(()),
         }
     }

@@ -8,12 +8,11 @@
 //!
 //! Walls thinner than half a cube have lines in them, but bend as polynomials of a whole cube do.
 
-use super::ObjectError;
 use super::attachment::SurfacePoint;
 use super::element::{CUBE_NODES, GAUSS, Lame, Quadrature, cube};
 use super::inclusion::Materials;
 use super::solid::Elements;
-use crate::scene::GRID_LINE;
+use crate::{Error, error, scene::GRID_LINE};
 use glam::{DVec2, DVec3, IVec3};
 use robust::{Coord, orient2d};
 
@@ -81,13 +80,8 @@ impl Lattice {
     /// Fills the closed surface with cubes of `size` (m). `points`: on all of the surface, so that each has a cube.
     ///
     /// # Errors
-    /// [`ObjectError::TooManyCubes`].
-    pub fn fill(
-        nodes: &[DVec3],
-        triangles: &[[u32; 3]],
-        size: f64,
-        points: &[SurfacePoint],
-    ) -> Result<Self, ObjectError> {
+    /// When there would be too many.
+    pub fn fill(nodes: &[DVec3], triangles: &[[u32; 3]], size: f64, points: &[SurfacePoint]) -> Result<Self, Error> {
         let mut lattice = Self::around(nodes, size)?;
         let mut facing = vec![DVec3::ZERO; lattice.numbers.len()];
         for point in points {
@@ -124,7 +118,7 @@ impl Lattice {
         Ok(lattice)
     }
 
-    fn around(nodes: &[DVec3], size: f64) -> Result<Self, ObjectError> {
+    fn around(nodes: &[DVec3], size: f64) -> Result<Self, Error> {
         let low = nodes.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = nodes.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         // A whole number of cubes, however it is rounded, is that number.
@@ -133,7 +127,10 @@ impl Lattice {
         let countable = cubes <= MAX_CUBES;
         if !countable {
             let length = (high - low).max_element();
-            return Err(ObjectError::TooManyCubes { cell: size, length, cubes, limit: MAX_CUBES });
+            return Err(error!(
+                "cells of {size} m make {cubes:.0} cubes of an object that is {length:.3} m long, more than {MAX_CUBES:.0}: \
+                 make object.elasticity.cell larger, or scale a mesh that was drawn in millimetres"
+            ));
         }
         // In the middle, so that a box of a whole number of cubes is met exactly.
         let origin = low.midpoint(high) - 0.5 * size * counts;
@@ -285,7 +282,7 @@ impl Elements for Lattice {
         &self.cubes[element].nodes
     }
 
-    fn quadrature(&self, element: usize, materials: &Materials<'_>) -> Result<(Quadrature, Vec<Lame>), ObjectError> {
+    fn quadrature(&self, element: usize, materials: &Materials<'_>) -> Result<(Quadrature, Vec<Lame>), Error> {
         let cube = &self.cubes[element];
         let low = self.origin + self.size * cube.at.as_dvec3();
         let mut quadrature = Quadrature::default();

@@ -10,8 +10,8 @@ mod body;
 mod compliance;
 mod condensation;
 mod crossing;
+mod draft;
 mod element;
-mod error;
 mod factor;
 mod ground;
 mod icosphere;
@@ -35,10 +35,10 @@ mod topology;
 pub use attachment::Attachment;
 pub use body::Body;
 pub use compliance::Compliance;
-pub use error::{ObjectError, SurfaceDefect};
-pub use factor::{Factor, FactorError};
+pub use draft::{Draft, LengthUnit};
+pub use factor::Factor;
 pub(crate) use icosphere::generate as icosphere;
-pub(crate) use import::{MOST_METRES, length, read as read_surface};
+pub(crate) use import::{MOST_METRES, corners, length, read as read_surface};
 pub use lattice_error::LatticeError;
 pub use settled::settled;
 pub use skin::Skin;
@@ -47,7 +47,7 @@ pub use stiffness::Stiffness;
 pub use topology::Topology;
 
 use crate::{
-    memory,
+    Error, error, memory,
     scene::{ElasticSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape},
 };
 use glam::DVec3;
@@ -106,7 +106,7 @@ impl Object {
     /// # Errors
     /// When the file cannot be read, the surface is not closed and orientable, a number is out of range, or the ground
     /// does not hold the object.
-    pub fn build(spec: &ObjectSpec) -> Result<Self, ObjectError> {
+    pub fn build(spec: &ObjectSpec) -> Result<Self, Error> {
         let mut warnings = Vec::new();
         let body = match &spec.shape {
             Shape::Sphere { centre, radius, rings, segments } => {
@@ -117,15 +117,15 @@ impl Object {
                 check_count(divisions.saturating_mul(*divisions).saturating_mul(10).saturating_add(2))?;
                 Body::shell(icosphere::generate(*centre, *radius, *divisions)?)
             }
-            Shape::Mesh { file, scale, centre, refine } => {
-                let mut shell = import::read(file, *scale, *centre, &mut warnings)?;
+            Shape::Mesh { file, placement, refine } => {
+                let mut shell = import::read(file, placement, &mut warnings)?;
                 if let Some(edge) = refine {
-                    let refuse = |defect| ObjectError::Surface { surface: surface_name(spec), defect };
+                    let refuse = |defect: String| refused(spec, &defect);
                     shell = refine::refine(shell, *edge, &mut warnings, refuse)?;
                 }
                 Body::shell(shell)
             }
-            Shape::Tetrahedra { file, scale, centre } => {
+            Shape::Tetrahedra { file, placement } => {
                 let inclusions = match &spec.material {
                     Material::Elastic(elastic) => &elastic.inclusions[..],
                     _ => &[],
@@ -135,7 +135,7 @@ impl Object {
                     InclusionPlace::Sphere { .. } => None,
                 };
                 let wanted: Vec<u32> = inclusions.iter().filter_map(region).collect();
-                import::read_tetrahedra(file, *scale, *centre, &wanted, &mut warnings)?
+                import::read_tetrahedra(file, placement, &wanted, &mut warnings)?
             }
         };
         Self::assemble(spec, body, warnings)
@@ -145,29 +145,32 @@ impl Object {
     ///
     /// # Errors
     /// As for [`Object::from_body`].
-    pub fn from_surface(spec: &ObjectSpec, nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, ObjectError> {
+    pub fn from_surface(spec: &ObjectSpec, nodes: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
         Self::from_body(spec, Body::shell((nodes, triangles)))
     }
 
     /// Builds the object of `spec` on the geometry that a dataset holds of it; no file is read.
     ///
     /// # Errors
-    /// As for [`Object::build`], except for files; [`ObjectError::OtherTetrahedra`] if one of `spec` and `body` has
-    /// tetrahedra and the other none; [`ObjectError::TetrahedronNode`] and [`ObjectError::SurfaceNodes`] if `body`
-    /// names nodes that it lacks.
-    pub fn from_body(spec: &ObjectSpec, body: Body) -> Result<Self, ObjectError> {
+    /// As for [`Object::build`], except for files; also when one of `spec` and `body` has tetrahedra and the other none,
+    /// or `body` names nodes that it lacks.
+    pub fn from_body(spec: &ObjectSpec, body: Body) -> Result<Self, Error> {
         if matches!(spec.shape, Shape::Tetrahedra { .. }) == body.tetrahedra.is_empty() {
-            return Err(ObjectError::OtherTetrahedra);
+            return Err(
+                "the tetrahedra of the scene's object and those that are stored do not agree, as in datasets of earlier \
+                 versions, which held none: bake the scene again"
+                    .into(),
+            );
         }
         body.check()?;
         Self::assemble(spec, body, Vec::new())
     }
 
-    fn assemble(spec: &ObjectSpec, mut body: Body, mut warnings: Vec<String>) -> Result<Self, ObjectError> {
+    fn assemble(spec: &ObjectSpec, mut body: Body, mut warnings: Vec<String>) -> Result<Self, Error> {
         check_parameters(spec)?;
         check_count(body.nodes.len())?;
         let surface = topology::close(&body.nodes[..body.surface_nodes], &mut body.triangles)
-            .map_err(|defect| ObjectError::Surface { surface: surface_name(spec), defect })?;
+            .map_err(|defect| refused(spec, &defect))?;
         warnings.extend(surface.warnings);
         let shell = &body.nodes[..body.surface_nodes];
         let edge = topology::mean_edge(shell, &body.triangles);
@@ -264,13 +267,15 @@ impl Object {
 const MAX_NODES: usize = 1 << 20;
 
 /// Refuses an object whose stiffness and factor would not fit in memory, before anything is allocated.
-fn check_count(nodes: usize) -> Result<(), ObjectError> {
+fn check_count(nodes: usize) -> Result<(), Error> {
     if nodes > MAX_NODES {
-        return Err(ObjectError::TooManyNodes { nodes, limit: MAX_NODES });
+        return Err(error!(
+            "an object of {nodes} nodes is more than the {MAX_NODES} that are taken: use a coarser surface"
+        ));
     }
     let needed = nodes * LEAST_BYTES_PER_NODE;
     let enough = if needed > memory::SMALL { memory::check(needed) } else { Ok(()) };
-    enough.map_err(|shortage| ObjectError::Memory { nodes, shortage })
+    enough.map_err(|shortage| error!("an object of {nodes} nodes: {shortage}, or use a coarser surface"))
 }
 
 /// Least memory that a node takes (bytes): nine numbers for the node and for half of the six neighbours that it has on
@@ -278,7 +283,7 @@ fn check_count(nodes: usize) -> Result<(), ObjectError> {
 const LEAST_BYTES_PER_NODE: usize = 4 * 9 * size_of::<f64>();
 
 /// Numbers that a scene file has had checked already, and a specification made in code has not.
-fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
+fn check_parameters(spec: &ObjectSpec) -> Result<(), Error> {
     let material = match &spec.material {
         Material::Springs(springs) => Some(("spring stiffness", springs.stiffness)),
         Material::Elastic(elastic) => Some(("Young's modulus", elastic.young)),
@@ -290,48 +295,53 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), ObjectError> {
         spec.skin.map(|skin| ("skin's greatest coefficient", skin.tension.max(skin.bending).max(skin.foundation)));
     for (name, value) in material.into_iter().chain(ground).chain(skin).chain([("node mass", spec.node_mass)]) {
         if !(value > 0.0 && value.is_finite()) {
-            return Err(ObjectError::Parameter { name, value, range: "positive and finite" });
+            return Err(out_of_range(name, value, "positive and finite"));
         }
     }
     let needs_solid = |stiffness| matches!(stiffness, GroundStiffness::Clamp | GroundStiffness::PerVolume(_));
     let is_elastic = matches!(spec.material, Material::Elastic(_));
     if spec.ground.as_ref().is_some_and(|ground| needs_solid(ground.stiffness)) && !is_elastic {
-        return Err(ObjectError::GroundWithoutSolid);
+        return Err(
+            "a ground per volume, or one that clamps, needs an elastic solid: give a stiffness per node or per area"
+                .into(),
+        );
     }
     let skin = spec.skin.map_or([0.0; 3], |skin| [skin.tension, skin.bending, skin.foundation]);
     let names = ["tension of the skin", "bending stiffness of the skin", "foundation of the skin"];
     let damping = ("node damping", spec.node_damping);
     for (name, value) in names.into_iter().zip(skin).chain([damping]) {
         if !(value >= 0.0 && value.is_finite()) {
-            return Err(ObjectError::Parameter { name, value, range: "zero or positive, and finite" });
+            return Err(out_of_range(name, value, "zero or positive, and finite"));
         }
     }
     if let Material::Elastic(ElasticSpec { poisson, cell, inclusions, .. }) = &spec.material {
         for value in inclusions.iter().map(|inclusion| inclusion.poisson).chain([*poisson]) {
             if !(value > -1.0 && value < 0.5) {
-                return Err(ObjectError::Parameter { name: "Poisson's ratio", value, range: "above -1 and below 0.5" });
+                return Err(out_of_range("Poisson's ratio", value, "above -1 and below 0.5"));
             }
         }
         for value in inclusions.iter().map(|inclusion| inclusion.young) {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(ObjectError::Parameter {
-                    name: "inclusion's Young's modulus",
-                    value,
-                    range: "positive and finite",
-                });
+                return Err(out_of_range("inclusion's Young's modulus", value, "positive and finite"));
             }
         }
         if let Some(value) = cell.filter(|cell| !(*cell > 0.0 && cell.is_finite())) {
-            return Err(ObjectError::Parameter { name: "cell", value, range: "positive and finite" });
+            return Err(out_of_range("cell", value, "positive and finite"));
         }
     }
     Ok(())
 }
 
 /// Returns how messages call the surface.
-fn surface_name(spec: &ObjectSpec) -> String {
+/// The error of a surface on which contact cannot be computed, because of `defect`.
+fn refused(spec: &ObjectSpec, defect: &str) -> Error {
     match &spec.shape {
-        Shape::Sphere { .. } | Shape::Icosphere { .. } => "sphere".to_owned(),
-        Shape::Mesh { file, .. } | Shape::Tetrahedra { file, .. } => file.display().to_string(),
+        Shape::Sphere { .. } | Shape::Icosphere { .. } => error!("sphere: {defect}"),
+        Shape::Mesh { file, .. } | Shape::Tetrahedra { file, .. } => Error::at(file, defect),
     }
+}
+
+/// The error of the number `name` that is `value`, and must be in `range`.
+fn out_of_range(name: &str, value: f64, range: &str) -> Error {
+    error!("{name} is {value}: it must be {range}")
 }

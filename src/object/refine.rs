@@ -6,7 +6,8 @@
 //! nodes of the mesh, encloses about the same volume, and sharp edges become round over about the length of the
 //! triangles beside them.
 
-use super::{ObjectError, Shell, SurfaceDefect, Topology, check_count, topology};
+use super::{Shell, Topology, check_count, out_of_range, topology};
+use crate::Error;
 use glam::DVec3;
 use std::f64::consts::TAU;
 
@@ -19,10 +20,10 @@ pub(super) fn refine(
     (mut nodes, mut triangles): Shell,
     edge: f64,
     warnings: &mut Vec<String>,
-    refuse: impl Fn(SurfaceDefect) -> ObjectError,
-) -> Result<Shell, ObjectError> {
+    refuse: impl Fn(String) -> Error,
+) -> Result<Shell, Error> {
     if !(edge > 0.0 && edge.is_finite()) {
-        return Err(ObjectError::Parameter { name: "refine", value: edge, range: "positive and finite" });
+        return Err(out_of_range("refine", edge, "positive and finite"));
     }
     loop {
         let surface = topology::close(&nodes, &mut triangles).map_err(&refuse)?;

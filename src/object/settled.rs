@@ -1,6 +1,7 @@
 //! Where an object comes to rest under constant loads.
 
-use super::{Factor, FactorError, Object, Stiffening};
+use super::{Factor, Object, Stiffening};
+use crate::Error;
 use glam::DVec3;
 
 /// Last step of an equilibrium of stiffening springs over its displacement (1): a pixel is a thousandth of a
@@ -17,7 +18,7 @@ const STEPS: usize = 5000;
 ///
 /// # Errors
 /// When there is no memory for the factor of K1.
-pub fn settled(object: &Object, loads: &[DVec3], stiffening: Option<&Stiffening>) -> Result<Vec<DVec3>, FactorError> {
+pub fn settled(object: &Object, loads: &[DVec3], stiffening: Option<&Stiffening>) -> Result<Vec<DVec3>, Error> {
     let mut displacement = loads.to_vec();
     object.factor.solve(&mut displacement);
     let Some(stiffening) = stiffening else { return Ok(displacement) };

@@ -1,9 +1,10 @@
 //! An elastic solid as finite elements, whatever their shape, and how its stiffness is put together.
 
+use super::Stiffness;
 use super::attachment::SurfacePoint;
 use super::element::{Lame, Quadrature};
 use super::inclusion::Materials;
-use super::{ObjectError, Stiffness};
+use crate::Error;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -23,8 +24,8 @@ pub(super) trait Elements: Sync {
     /// Points of an element with the material at each.
     ///
     /// # Errors
-    /// [`ObjectError::FlatTetrahedron`].
-    fn quadrature(&self, element: usize, materials: &Materials<'_>) -> Result<(Quadrature, Vec<Lame>), ObjectError>;
+    /// When a tetrahedron has no volume.
+    fn quadrature(&self, element: usize, materials: &Materials<'_>) -> Result<(Quadrature, Vec<Lame>), Error>;
 
     /// A number that elements of the same stiffness share, where there are such.
     fn kind(&self, element: usize, materials: &Materials<'_>) -> Option<usize>;
@@ -47,13 +48,13 @@ type Formed = Arc<(Vec<DMat3>, Vec<f64>)>;
 /// Zienkiewicz 1976).
 ///
 /// # Errors
-/// As for [`Elements::quadrature`]; [`ObjectError::EmptyInclusion`].
+/// As for [`Elements::quadrature`]; or where an inclusion holds no part of the solid.
 pub(super) fn add(
     elements: &dyn Elements,
     materials: &Materials<'_>,
     stiffness: &mut Stiffness,
-) -> Result<Vec<f64>, ObjectError> {
-    let form = |element: usize| -> Result<Formed, ObjectError> {
+) -> Result<Vec<f64>, Error> {
+    let form = |element: usize| -> Result<Formed, Error> {
         let (quadrature, lame) = elements.quadrature(element, materials)?;
         let n = elements.nodes(element).len();
         let masses = quadrature.products().into_iter().step_by(n + 1).collect();

@@ -4,7 +4,8 @@
 //! the azimuth, every other ring turned by half a step so that the triangles are nearly isosceles and favour no sense
 //! of rotation; the last node is the lower pole. Ten rings of ten make the paper's 102 nodes, and 200 triangles.
 
-use super::ObjectError;
+use super::out_of_range;
+use crate::Error;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -14,15 +15,15 @@ pub(super) fn generate(
     radius: f64,
     rings: usize,
     segments: usize,
-) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), ObjectError> {
+) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), Error> {
     if !(radius > 0.0 && radius.is_finite()) {
-        return Err(ObjectError::Parameter { name: "radius", value: radius, range: "positive and finite" });
+        return Err(out_of_range("radius", radius, "positive and finite"));
     }
     if rings < 1 {
-        return Err(ObjectError::Parameter { name: "number of rings", value: rings as f64, range: "at least 1" });
+        return Err(out_of_range("number of rings", rings as f64, "at least 1"));
     }
     if segments < 3 {
-        return Err(ObjectError::Parameter { name: "number of segments", value: segments as f64, range: "at least 3" });
+        return Err(out_of_range("number of segments", segments as f64, "at least 3"));
     }
     let mut nodes = Vec::with_capacity(rings * segments + 2);
     nodes.push(centre + radius * DVec3::Z);

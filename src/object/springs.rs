@@ -5,20 +5,23 @@
 //! the diagonal block. Kn and Kg are positive semidefinite by construction, so K is singular only where a rigid motion
 //! or a mechanism is left free.
 
-use super::{Body, ObjectError, Stiffness, SurfaceDefect, element::TETRAHEDRON_EDGES};
-use crate::scene::{ObjectSpec, SpringKind, SpringSpec};
+use super::{Body, Stiffness, element::TETRAHEDRON_EDGES, refused, topology::coincident};
+use crate::{
+    Error,
+    scene::{ObjectSpec, SpringKind, SpringSpec},
+};
 use glam::{DMat3, DVec3};
 
 /// The edges along which the springs of `body` run, each once: those of its tetrahedra, or of its surface.
 ///
 /// # Errors
-/// [`ObjectError::CurvedSprings`].
-pub(super) fn edges(body: &Body, surface: Vec<[u32; 2]>) -> Result<Vec<[u32; 2]>, ObjectError> {
+/// When the tetrahedra have nodes in the middles of their edges.
+pub(super) fn edges(body: &Body, surface: Vec<[u32; 2]>) -> Result<Vec<[u32; 2]>, Error> {
     if body.tetrahedra.is_empty() {
         return Ok(surface);
     }
     if !body.mid_nodes.is_empty() {
-        return Err(ObjectError::CurvedSprings);
+        return Err("springs run along tetrahedra of four nodes: save the mesh in first order (gmsh -order 1)".into());
     }
     let ends = |corners: &[u32; 4]| {
         let corners = *corners;
@@ -37,16 +40,14 @@ pub(super) fn add(
     nodes: &[DVec3],
     edges: &[[u32; 2]],
     stiffness: &mut Stiffness,
-) -> Result<(), ObjectError> {
+) -> Result<(), Error> {
     for &[a, b] in edges {
         let (i, j) = (a as usize, b as usize);
         let block = match springs.kind {
             SpringKind::Isotropic => DMat3::from_diagonal(DVec3::splat(springs.stiffness)),
             SpringKind::Axial => {
-                let direction = (nodes[j] - nodes[i]).try_normalize().ok_or_else(|| ObjectError::Surface {
-                    surface: super::surface_name(spec),
-                    defect: SurfaceDefect::CoincidentNodes { first: a, second: b },
-                })?;
+                let direction = (nodes[j] - nodes[i]).try_normalize();
+                let direction = direction.ok_or_else(|| refused(spec, &coincident(a, b)))?;
                 springs.stiffness * outer(direction)
             }
         };

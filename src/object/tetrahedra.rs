@@ -3,11 +3,12 @@
 //! A tetrahedron of four nodes is straight: nodes in the middles of its edges raise it to the second order. Ten nodes
 //! of a file may lie on a curved surface; place and displacement then have the same shape functions (isoparametric).
 
+use super::Body;
 use super::attachment::SurfacePoint;
 use super::element::{GAUSS, Lame, Quadrature, TETRAHEDRON_EDGES, TETRAHEDRON_NODES, tetrahedron as shape_functions};
 use super::inclusion::Materials;
 use super::solid::Elements;
-use super::{Body, ObjectError};
+use crate::{Error, error};
 use glam::{DMat3, DVec3, DVec4};
 use std::collections::HashMap;
 
@@ -156,7 +157,7 @@ impl Elements for Tetrahedra {
         &self.elements[element]
     }
 
-    fn quadrature(&self, element: usize, materials: &Materials<'_>) -> Result<(Quadrature, Vec<Lame>), ObjectError> {
+    fn quadrature(&self, element: usize, materials: &Materials<'_>) -> Result<(Quadrature, Vec<Lame>), Error> {
         let mut quadrature = Quadrature::default();
         let corners = [0, 1, 2, 3].map(|k| self.elements[element][k]);
         let places = corners.map(|corner| self.nodes[corner as usize]);
@@ -166,7 +167,9 @@ impl Elements for Tetrahedra {
         for (at, weight) in points(self.is_curved || is_cut) {
             let is_proper = self.push(&mut quadrature, element, at, weight);
             if !is_proper {
-                return Err(ObjectError::FlatTetrahedron { number: element, corners });
+                return Err(error!(
+                    "tetrahedron {element} (nodes {corners:?}, surface nodes counted first) has no volume: mesh the solid anew"
+                ));
             }
         }
         let region = self.region(element);

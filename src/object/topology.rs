@@ -8,7 +8,7 @@
 //! outward is away from the material, of which a point is part when an odd number of shells surround it. Parts that
 //! cross or touch are refused (see [`super::crossing`]), so one node decides for a whole part which others surround it.
 
-use super::{SurfaceDefect, crossing};
+use super::crossing;
 use glam::DVec3;
 use std::{collections::HashMap, f64::consts::PI};
 
@@ -53,12 +53,15 @@ pub(super) struct ClosedSurface {
 }
 
 /// Checks that `triangles` form closed, orientable surfaces of proper triangles, and turns them outward.
-pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<ClosedSurface, SurfaceDefect> {
+///
+/// # Errors
+/// Says, here and below, which defect keeps them from it, and the remedy.
+pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<ClosedSurface, String> {
     check_nodes(nodes)?;
     check_triangles(nodes, triangles)?;
     let (around_offsets, around) = triangles_around(nodes.len(), triangles);
     if let Some(node) = (0..nodes.len()).find(|&j| around_offsets[j] == around_offsets[j + 1]) {
-        return Err(SurfaceDefect::UnusedNode { node: node as u32 });
+        return Err(format!("node {node} belongs to no triangle: remove it"));
     }
     let (edges, across) = pair_edges(triangles)?;
     // First of all: a closed surface with one side has no place in space without crossing itself.
@@ -81,18 +84,23 @@ pub(super) fn mean_edge(nodes: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
     sum / (3 * triangles.len()).max(1) as f64
 }
 
-fn check_nodes(nodes: &[DVec3]) -> Result<(), SurfaceDefect> {
+fn check_nodes(nodes: &[DVec3]) -> Result<(), String> {
     let mut places = HashMap::with_capacity(nodes.len());
     for (node, position) in nodes.iter().enumerate() {
         let node = node as u32;
         if !position.is_finite() {
-            return Err(SurfaceDefect::NotFinite { node });
+            return Err(format!("node {node} has a coordinate that is not a finite number"));
         }
         if let Some(first) = places.insert(place(*position), node) {
-            return Err(SurfaceDefect::CoincidentNodes { first, second: node });
+            return Err(coincident(first, node));
         }
     }
     Ok(())
+}
+
+/// The defect of two nodes at one place.
+pub(super) fn coincident(first: u32, second: u32) -> String {
+    format!("nodes {first} and {second} lie at the same point: merge them")
 }
 
 /// The bits of a point: equal for equal points. Adding zero makes -0 into 0.
@@ -100,15 +108,16 @@ pub(super) fn place(position: DVec3) -> [u64; 3] {
     position.to_array().map(|x| (x + 0.0).to_bits())
 }
 
-fn check_triangles(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), SurfaceDefect> {
+fn check_triangles(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     if triangles.is_empty() {
-        return Err(SurfaceDefect::Empty);
+        return Err("the surface has no triangles".into());
     }
     let mut seen = HashMap::with_capacity(triangles.len());
     for (triangle, corners) in triangles.iter().enumerate() {
         let triangle = triangle as u32;
         if let Some(&node) = corners.iter().find(|&&node| node as usize >= nodes.len()) {
-            return Err(SurfaceDefect::NodeOutOfRange { triangle, node, count: nodes.len() });
+            let count = nodes.len();
+            return Err(format!("triangle {triangle} names node {node}, but there are only {count} nodes"));
         }
         let [a, b, c] = corners.map(|node| nodes[node as usize]);
         let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
@@ -116,12 +125,13 @@ fn check_triangles(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), Surfac
         // Not `<=`, so that an overflow to infinity or NaN is refused as well.
         let proper = double_area > MIN_TRIANGLE_ASPECT * longest;
         if !proper {
-            return Err(SurfaceDefect::DegenerateTriangle { triangle, corners: *corners });
+            let [a, b, c] = corners;
+            return Err(format!("triangle {triangle} (nodes {a} {b} {c}) has no area: remove it or merge its nodes"));
         }
         let mut sorted = *corners;
         sorted.sort_unstable();
         if let Some(first) = seen.insert(sorted, triangle) {
-            return Err(SurfaceDefect::RepeatedTriangle { first, second: triangle });
+            return Err(format!("triangles {first} and {triangle} have the same three nodes: remove one"));
         }
     }
     Ok(())
@@ -151,7 +161,7 @@ type Side = ([u32; 2], u32, usize);
 
 /// Each edge once, and the triangle across each edge of each triangle.
 #[expect(clippy::type_complexity)]
-fn pair_edges(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 2]>, Vec<[u32; 3]>), SurfaceDefect> {
+fn pair_edges(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 2]>, Vec<[u32; 3]>), String> {
     let mut sides: Vec<Side> = Vec::with_capacity(3 * triangles.len());
     for (triangle, corners) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -175,11 +185,17 @@ fn pair_edges(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 2]>, Vec<[u32; 3]>), 
                 open_edges += 1;
                 open.get_or_insert((*nodes, *triangle));
             }
-            many => return Err(SurfaceDefect::NonManifoldEdge { nodes: many[0].0, triangles: many.len() }),
+            many => {
+                let ([a, b], count) = (many[0].0, many.len());
+                return Err(format!("the surface is not a manifold: edge {a} to {b} has {count} triangles, not 2"));
+            }
         }
     }
     match open {
-        Some((nodes, triangle)) => Err(SurfaceDefect::Open { nodes, triangle, edges: open_edges }),
+        Some(([a, b], triangle)) => Err(format!(
+            "the surface is open: edge {a} to {b} has a triangle on one side only ({triangle}); there are {open_edges} \
+             such edges: close the holes, or merge vertices by distance"
+        )),
         None => Ok((edges, across)),
     }
 }
@@ -192,7 +208,7 @@ struct Part {
 }
 
 /// Turns triangles so that neighbours run along their common edge in opposite senses; the parts that are connected.
-fn orient(triangles: &mut [[u32; 3]], across: &[[u32; 3]]) -> Result<Vec<Part>, SurfaceDefect> {
+fn orient(triangles: &mut [[u32; 3]], across: &[[u32; 3]]) -> Result<Vec<Part>, String> {
     let mut turned: Vec<Option<bool>> = vec![None; triangles.len()];
     let mut parts = Vec::new();
     for seed in 0..triangles.len() {
@@ -216,7 +232,11 @@ fn orient(triangles: &mut [[u32; 3]], across: &[[u32; 3]]) -> Result<Vec<Part>, 
                         part.turned += usize::from(wanted);
                         part.triangles.push(neighbour);
                     }
-                    Some(found) if found != wanted => return Err(SurfaceDefect::NonOrientable { nodes: [a, b] }),
+                    Some(found) if found != wanted => {
+                        return Err(format!(
+                            "the surface has no inside: its triangles cannot be oriented alike across edge {a} to {b}"
+                        ));
+                    }
                     Some(_) => {}
                 }
             }
@@ -242,7 +262,7 @@ fn turn_outward(
     triangles: &mut [[u32; 3]],
     parts: &[Part],
     warnings: &mut Vec<String>,
-) -> Result<(), SurfaceDefect> {
+) -> Result<(), String> {
     let mut total_turned = 0;
     let mut cavities = 0;
     for part in parts {
@@ -257,7 +277,7 @@ fn turn_outward(
         }
         let solid = volume.abs() > MIN_TRIANGLE_ASPECT * size;
         if !solid {
-            return Err(SurfaceDefect::NoVolume { node: seed });
+            return Err(format!("the part of the surface around node {seed} encloses no volume: it is folded flat"));
         }
         let mut turned = part.turned;
         let around = parts.iter().filter(|other| !std::ptr::eq(part, *other));
@@ -295,7 +315,7 @@ fn surrounds(nodes: &[DVec3], triangles: &[[u32; 3]], part: &Part, point: DVec3)
 }
 
 /// Refuses nodes at which two sheets touch: walking from triangle to triangle must visit all triangles around the node.
-fn check_fans(topology: &Topology, triangles: &[[u32; 3]]) -> Result<(), SurfaceDefect> {
+fn check_fans(topology: &Topology, triangles: &[[u32; 3]]) -> Result<(), String> {
     for node in 0..topology.around_offsets.len() - 1 {
         let around = topology.triangles_around(node);
         let mut current = around[0] as usize;
@@ -309,7 +329,10 @@ fn check_fans(topology: &Topology, triangles: &[[u32; 3]]) -> Result<(), Surface
             }
         }
         if visited != around.len() {
-            return Err(SurfaceDefect::PinchedNode { node: node as u32 });
+            return Err(format!(
+                "the surface is not a manifold: separate sheets meet at node {node} only: give each sheet a node of its \
+                 own"
+            ));
         }
     }
     Ok(())

@@ -1,9 +1,10 @@
 //! Inverse kinematics: the configuration that puts a contact node at a position.
 //!
-//! Damped Gauss-Newton steps `dq = J^T (J J^T + lambda^2 1)^-1 (x - x_i(q))` from the configuration before, within
-//! the joints' limits; the damping (Nakamura and Hanafusa 1986) grows where a step makes things worse. Nearby positions
-//! thus get nearby configurations, with redundant chains too.
+//! Damped Gauss-Newton steps `dq = J^T (J J^T + lambda^2 1)^-1 (x - x_i(q))` from the configuration before. A joint
+//! that comes to a limit is held there, and the others go on. The damping (Nakamura and Hanafusa 1986) grows where a
+//! step makes things worse. Nearby positions thus get nearby configurations, with redundant chains too.
 
+use super::posture::outer;
 use super::{Chain, Pose};
 use crate::JointVector;
 use glam::{DMat3, DVec3};
@@ -54,14 +55,31 @@ pub fn approach(chain: &Chain, node: usize, target: DVec3, start: &JointVector) 
 
 fn step(chain: &Chain, pose: &Pose, node: usize, target: DVec3, q: &JointVector, damping: f64) -> JointVector {
     let columns: Vec<DVec3> = (0..q.len()).map(|joint| chain.jacobian_column(pose, node, joint)).collect();
-    let outer = |a: &DVec3| DMat3::from_cols(*a * a.x, *a * a.y, *a * a.z);
-    let square = columns.iter().map(outer).fold(DMat3::ZERO, |sum, term| sum + term);
-    let system = square + DMat3::from_diagonal(DVec3::splat(damping * damping));
-    let pull = system.inverse() * (target - pose.nodes[node]);
+    let mut free = vec![true; q.len()];
     let mut next = *q;
-    for (joint, value) in next.iter_mut().enumerate() {
-        let [least, greatest] = chain.joints[joint].limits;
-        *value = (*value + columns[joint].dot(pull)).clamp(least, greatest);
+    // A joint that would pass its limit stops there, and the others do without it.
+    loop {
+        let (mut left, mut system) = (target - pose.nodes[node], DMat3::from_diagonal(DVec3::splat(damping * damping)));
+        for (joint, column) in columns.iter().enumerate() {
+            if free[joint] {
+                system += outer(*column);
+            } else {
+                left -= (next[joint] - q[joint]) * *column;
+            }
+        }
+        let pull = system.inverse() * left;
+        let mut stopped = false;
+        for joint in (0..q.len()).filter(|joint| free[*joint]).collect::<Vec<_>>() {
+            let [least, greatest] = chain.joints[joint].limits;
+            let wanted = q[joint] + columns[joint].dot(pull);
+            next[joint] = wanted.clamp(least, greatest);
+            if next[joint] != wanted {
+                free[joint] = false;
+                stopped = true;
+            }
+        }
+        if !stopped {
+            return next;
+        }
     }
-    next
 }

@@ -12,6 +12,7 @@ mod inertia;
 pub mod inverse_kinematics;
 mod jacobian;
 mod links;
+mod posture;
 mod press;
 #[cfg(test)]
 mod random;
@@ -20,4 +21,5 @@ pub use chain::{Chain, Node, Pose};
 pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere};
 pub use dynamics::Dynamics;
 pub use links::Links;
+pub use posture::{Posture, of_last_link};
 pub use press::{PRESS_GAP, Press};

@@ -1,20 +1,35 @@
-//! A motion that presses a contact node of an arm into an object, and a grid around it: what a scene begins with.
+//! Motions that press a contact node of an arm into an object and draw it over that, and a grid around them: what a scene
+//! begins with.
 //!
-//! The joints move along J^T n, by which the node moves along n. The length that everything is measured by is that of
+//! To press, the joints move along J^T n, by which the node moves along n. To scrape, inverse kinematics takes the node
+//! across n, along the direction in which the joints move it most. The length that everything is measured by is that of
 //! what is pressed: the radius of a ball, or a part of a body's width.
 
 use super::Chain;
+use super::inverse_kinematics::approach;
+use super::posture::{largest, outer};
 use crate::{
     JointVector,
     scene::{JointKind, JointSpec},
     toml_text::{list, number},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::fmt::{self, Write};
 
 /// Gap between node and object at the start, and how deep the motion presses, over the length of what is pressed (1).
 pub const PRESS_GAP: f64 = 0.15;
 const DEPTH: f64 = 0.35;
+
+/// How deep the node scrapes, and how far to either side, over that length (1).
+const SCRAPE_DEPTH: f64 = 0.2;
+const SCRAPE_WAY: f64 = 0.5;
+
+/// Ends of a stroke, over that way (1): to both sides of the point that is pressed, or where a limit is near, or an arm
+/// is stretched, to one.
+const STROKES: [[f64; 2]; 3] = [[-1.0, 1.0], [-2.0, 0.0], [0.0, 2.0]];
+
+/// How far the node may be from the end of a stroke, over that length (1): a twentieth of its depth.
+const SCRAPE_ERROR: f64 = 0.01;
 
 /// By how much the grid reaches beyond the motion at the node, over that length, and at most (1, rad).
 const MARGIN: f64 = 0.2;
@@ -33,13 +48,15 @@ const SHORTEST_LEVER: f64 = 0.2;
 /// Range of the levers (m): from a fingertip to the longest arm.
 const LEVERS: [f64; 2] = [0.01, 10.0];
 
-/// A grid and a motion.
+/// A grid and two motions.
 #[derive(Clone, Debug)]
 pub struct Press {
     /// Least and greatest coordinate of the grid, and its lines, for each joint (rad or m).
     pub axes: Vec<([f64; 2], usize)>,
     /// Where the motion begins and where it presses most (rad or m).
     pub motion: [JointVector; 2],
+    /// Ends of a stroke over the object, where the joints get there (rad or m).
+    pub scrape: Option<[JointVector; 2]>,
     /// How far the node moves per joint coordinate, with which gains are scaled (m/rad, or 1).
     pub levers: JointVector,
 }
@@ -53,18 +70,25 @@ impl Press {
         chain.pose(&q, &mut pose);
         let columns: Vec<DVec3> = (0..q.len()).map(|joint| chain.jacobian_column(&pose, node, joint)).collect();
         let square: f64 = columns.iter().map(|column| column.dot(direction).powi(2)).sum();
-        // By how much each joint moves where the node moves by a metre along the direction.
-        let way = columns.iter().map(|column| if square > 0.0 { column.dot(direction) / square } else { 0.0 });
-        let (mut start, mut end) = (q, q);
+        // Where the node has moved by so much along the direction, to first order.
+        let moved = |way: f64| {
+            let mut q = q;
+            for ((q, joint), column) in q.iter_mut().zip(&chain.joints).zip(&columns) {
+                let share = if square > 0.0 { column.dot(direction) / square } else { 0.0 };
+                *q = within(joint, *q + share * way);
+            }
+            q
+        };
+        let [start, end] = [-PRESS_GAP, PRESS_GAP + DEPTH].map(|way| moved(way * length));
+        let scrape = stroke(chain, moved((PRESS_GAP + SCRAPE_DEPTH) * length), node, direction, length);
         let mut axes = Vec::new();
-        for (j, (way, joint)) in way.zip(&chain.joints).enumerate() {
-            let [lower, upper] = joint.limits;
-            start[j] = rounded(q[j] - way * PRESS_GAP * length).clamp(lower, upper);
-            end[j] = rounded(q[j] + way * (PRESS_GAP + DEPTH) * length).clamp(lower, upper);
+        for (j, joint) in chain.joints.iter().enumerate() {
             let most = if joint.kind == JointKind::Revolute { MOST_MARGIN } else { length };
             let margin = (MARGIN * length / columns[j].length()).min(most).max(LEAST_MARGIN);
-            let range = [start[j].min(end[j]) - margin, start[j].max(end[j]) + margin];
-            axes.push((range.map(|end| rounded(end).clamp(lower, upper)), LINES[q.len().clamp(1, LINES.len()) - 1]));
+            let ways = [start[j], end[j]].into_iter().chain(scrape.iter().flatten().map(|end| end[j]));
+            let (least, greatest) = ways.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+            let range = [least - margin, greatest + margin];
+            axes.push((range.map(|end| within(joint, end)), LINES[q.len().clamp(1, LINES.len()) - 1]));
         }
         let longest = columns.iter().map(|column| column.length()).fold(0.0, f64::max);
         let levers = columns.iter().zip(&chain.joints).map(|(column, joint)| match joint.kind {
@@ -72,7 +96,7 @@ impl Press {
             JointKind::Prismatic => 1.0,
         });
         let levers = JointVector::from_slice(&levers.collect::<Vec<_>>());
-        Self { axes, motion: [start, end], levers }
+        Self { axes, motion: [start, end], scrape, levers }
     }
 
     /// Number of the grid's points.
@@ -110,11 +134,36 @@ impl Press {
         for (time, q) in [(0.0, &start), (0.5, &start), (2.0, &end), (2.6, &end), (4.1, &start), (4.5, &start)] {
             writeln!(text, "    {{ time = {time:?}, q = {q} }},")?;
         }
+        writeln!(text, "]")?;
+        let Some(ends) = self.scrape else { return Ok(()) };
+        writeln!(text, "# Down, to and fro over the object, and off again.\nscrape = [")?;
+        let [from, to] = ends.map(|q| list(&q, |x| number(*x, 9)));
+        for (time, q) in [(0.0, &start), (0.5, &start), (1.5, &from), (3.0, &to), (4.5, &from), (5.5, &start)] {
+            writeln!(text, "    {{ time = {time:?}, q = {q} }},")?;
+        }
         writeln!(text, "]")
     }
 }
 
-/// Returns `coordinate` to a hundred thousandth of a radian or metre, as a scene shows it.
-fn rounded(coordinate: f64) -> f64 {
-    (coordinate * 1e5).round() / 1e5
+/// Ends of a stroke of `node` across `direction` about where it is at `q`; `None` where the joints do not get there.
+fn stroke(chain: &Chain, q: JointVector, node: usize, direction: DVec3, length: f64) -> Option<[JointVector; 2]> {
+    let mut pose = chain.new_pose();
+    chain.pose(&q, &mut pose);
+    let across = |x: DVec3| x - x.dot(direction) * direction;
+    let columns = (0..q.len()).map(|joint| across(chain.jacobian_column(&pose, node, joint)));
+    let square = columns.fold(DMat3::ZERO, |sum, column| sum + outer(column));
+    let way = largest(square, direction.any_orthonormal_vector());
+    let end = |way: DVec3| {
+        let (mut end, error) = approach(chain, node, pose.nodes[node] + SCRAPE_WAY * length * way, &q);
+        end.iter_mut().zip(&chain.joints).for_each(|(q, joint)| *q = within(joint, *q));
+        (error <= SCRAPE_ERROR * length).then_some(end)
+    };
+    let strokes = [way, direction.cross(way)].into_iter().flat_map(|way| STROKES.map(|ends| ends.map(|end| end * way)));
+    strokes.into_iter().find_map(|[from, to]| Some([end(from)?, end(to)?]))
+}
+
+/// Returns `coordinate` within the limits of `joint`, to a hundred thousandth of a radian or metre, as a scene shows it.
+fn within(joint: &JointSpec, coordinate: f64) -> f64 {
+    let [lower, upper] = joint.limits;
+    ((coordinate * 1e5).round() / 1e5).clamp(lower, upper)
 }

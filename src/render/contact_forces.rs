@@ -9,10 +9,12 @@
 //! *Solved.* A store of nodes at several levels keeps no forces, and a scene that is solved live has stored nothing.
 //! There the equilibrium is solved once a frame; its forces are those of the configuration itself.
 
-use super::{force_rows::ForceRows, graphics_error::GraphicsError, live::LiveScene};
+use super::{force_rows::ForceRows, live::LiveScene};
 use crate::{
+    Error,
     contact::{NodeForce, Solver, Status},
     dataset::{Dataset, Surface},
+    error,
     scene::Scene,
     sweep::Direct,
 };
@@ -35,12 +37,15 @@ impl ContactForces {
     ///
     /// # Errors
     /// When there are none, or they do not fit.
-    pub fn new(dataset: &Dataset, nodes: usize) -> Result<Self, GraphicsError> {
+    pub fn new(dataset: &Dataset, nodes: usize) -> Result<Self, Error> {
         let source = match &dataset.surface {
             Some(surface) if dataset.refinement.is_some() => Source::Solved(Box::new(solved(dataset, surface, nodes)?)),
             _ => {
-                let contacts = dataset.contacts.as_ref().ok_or(GraphicsError::NoForces)?;
-                let rows = ForceRows::new(&dataset.grid, contacts, nodes).ok_or(GraphicsError::Rows { nodes })?;
+                let contacts = dataset
+                    .contacts
+                    .as_ref()
+                    .ok_or("the dataset holds no contact forces: name [graphics] in its scene and bake it again")?;
+                let rows = ForceRows::new(&dataset.grid, contacts, nodes).ok_or_else(|| misfit(nodes))?;
                 Source::Stored(Box::new(rows))
             }
         };
@@ -79,14 +84,19 @@ impl ContactForces {
     }
 }
 
+/// The error of rows of contact forces that fit neither the grid nor an object of `nodes` nodes.
+fn misfit(nodes: usize) -> Error {
+    error!("the dataset's contact forces do not fit its grid and an object of {nodes} nodes: bake it again")
+}
+
 /// The scene of `dataset`, prepared to be solved with the geometry that it holds.
-fn solved(dataset: &Dataset, surface: &Surface, nodes: usize) -> Result<Direct, GraphicsError> {
-    let wrong = |error: &dyn std::fmt::Display| GraphicsError::Solved(error.to_string());
+fn solved(dataset: &Dataset, surface: &Surface, nodes: usize) -> Result<Direct, Error> {
+    let wrong = |error: &dyn std::fmt::Display| error!("contact cannot be solved for what is drawn: {error}");
     let scene =
         Scene::of_dataset(&dataset.scene, "scene", &dataset.provenance.algorithm).map_err(|error| wrong(&error))?;
     let object = surface.object(&scene.object).map_err(|error| wrong(&error))?;
     if object.rest.len() != nodes {
-        return Err(GraphicsError::Rows { nodes });
+        return Err(misfit(nodes));
     }
     Direct::of(&scene, object).map_err(|error| wrong(&error))
 }
@@ -130,8 +140,10 @@ mod tests {
             drawn.at(&q, 1.0, &mut forces);
             assert!(forces.iter().all(|force| *force == DVec3::ZERO), "{q:?}");
         }
-        assert!(matches!(ContactForces::new(&dataset, nodes + 1), Err(GraphicsError::Rows { .. })));
+        let refused =
+            |dataset: &Dataset, nodes| ContactForces::new(dataset, nodes).err().map(|error| error.to_string());
+        assert!(refused(&dataset, nodes + 1).is_some_and(|why| why.contains("do not fit")));
         dataset.scene = "not a scene".into();
-        assert!(matches!(ContactForces::new(&dataset, nodes), Err(GraphicsError::Solved(_))));
+        assert!(refused(&dataset, nodes).is_some_and(|why| why.contains("cannot be solved")));
     }
 }

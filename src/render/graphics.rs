@@ -7,8 +7,8 @@
 //!
 //! *Motion*: see [`ObjectMotion`].
 
-pub use super::{contact_forces::ContactForces, graphics_error::GraphicsError, object_motion::ObjectMotion};
-use crate::{object::Object, scene::GraphicsSpec};
+pub use super::{contact_forces::ContactForces, object_motion::ObjectMotion};
+use crate::{Error, object::Object, scene::GraphicsSpec};
 use glam::DVec3;
 
 /// A low-pass filter on the contact forces.
@@ -49,7 +49,7 @@ impl<'object> Graphics<'object> {
     ///
     /// # Errors
     /// When object and rate do not make a loop.
-    pub fn new(contact: ContactForces, object: &'object Object, spec: &GraphicsSpec) -> Result<Self, GraphicsError> {
+    pub fn new(contact: ContactForces, object: &'object Object, spec: &GraphicsSpec) -> Result<Self, Error> {
         let nodes = object.rest.len();
         let motion = ObjectMotion::new(object, 1.0 / spec.rate, &spec.effects)?;
         let smoothing = spec.effects.smoothing.map(|time| Smoothing::new(time, motion.period(), nodes));

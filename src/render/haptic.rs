@@ -25,8 +25,9 @@ use super::{
     watchdog::{self, GREATEST_POSITION_AGE, TickRate, Watchdog},
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::Slip,
+    error,
     field::{Sample, range::HaptizedRange},
     scene::HapticsSpec,
 };
@@ -101,24 +102,12 @@ struct Felt {
     remembered: Remembered,
 }
 
-/// Field, proxy and gains do not make a loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the dataset has {field} joints, the proxy {proxy}, and the haptic gains are for {gains}: they must agree")]
-pub struct JointsError {
-    /// Joints of the dataset.
-    pub field: usize,
-    /// Joints of the proxy.
-    pub proxy: usize,
-    /// Numbers in the first list of gains that differs, or in the last.
-    pub gains: usize,
-}
-
 impl Haptics {
     /// A loop over the torque of `source` with the proxy `npmi` and the gains of `spec`. The proxy stays in the grid.
     ///
     /// # Errors
     /// When they differ in their number of joints.
-    pub fn new(source: impl Into<TorqueSource>, npmi: Npmi, spec: &HapticsSpec) -> Result<Self, JointsError> {
+    pub fn new(source: impl Into<TorqueSource>, npmi: Npmi, spec: &HapticsSpec) -> Result<Self, Error> {
         let source = source.into();
         let coupling = Coupling::new(spec);
         let (torque_limit, torque_rate_limit) = (spec.torque_limit, spec.torque_rate_limit);
@@ -135,7 +124,10 @@ impl Haptics {
         let lists = lists.map(|list| list.len());
         let gains = lists.into_iter().find(|&len| len != source.joints()).unwrap_or(lists[0]);
         if gains != source.joints() || npmi.joints() != source.joints() {
-            return Err(JointsError { field: source.joints(), proxy: npmi.joints(), gains });
+            let (field, proxy) = (source.joints(), npmi.joints());
+            return Err(error!(
+                "the dataset has {field} joints, the proxy {proxy}, and the haptic gains are for {gains}: they must agree"
+            ));
         }
         let period = 1.0 / spec.rate;
         let watchdog = Watchdog::new(period, spec.speed_limit);

@@ -6,13 +6,14 @@
 //! ([`Fault::Unsolved`](super::flags::Fault::Unsolved)).
 
 use crate::{
-    JointMatrix, JointVector,
-    contact::{LiveContact, LiveSolver, Model, Slip, Solvers, Status},
+    Error, JointMatrix, JointVector,
+    contact::{Equilibrium, LiveContact, LiveSolver, Model, Slip, Solvers, Status},
     dataset::{Axis, Dataset, Grid, Surface},
     field::{Flags, Sample},
+    joint_matrix::greatest_eigenvalue,
     object::Object,
     scene::{ContactLaw, Scene},
-    sweep::{BakeError, CpuBackend, Direct, build_object, sample},
+    sweep::{CpuBackend, Direct, build_object, sample, shallow},
 };
 
 /// Configurations at which the stiffness of the torque is looked at, spread over the grid (1). More: a steeper one is
@@ -20,14 +21,14 @@ use crate::{
 const STIFFNESS_SAMPLES: usize = 2048;
 
 /// Lines of the grid along each joint (1): the region is all that is used of it.
-const LINES: usize = 3;
+const LINES: usize = 2;
 
 /// A scene that is solved in every tick. Sessions share it.
 pub struct LiveScene {
     scene: Scene,
     direct: Direct,
     grid: Grid,
-    /// Tangents d tau/d q in contact, over the grid (N m/rad).
+    /// Tangents d tau/d q in shallow contact, over the scene's grid (N m/rad).
     tangents: Vec<JointMatrix>,
     follows: bool,
 }
@@ -37,7 +38,7 @@ impl LiveScene {
     ///
     /// # Errors
     /// When its object cannot be built, or its compliance cannot be formed.
-    pub fn new(scene: Scene) -> Result<Self, BakeError> {
+    pub fn new(scene: Scene) -> Result<Self, Error> {
         let object = build_object(&scene)?;
         Self::of(scene, object)
     }
@@ -46,7 +47,7 @@ impl LiveScene {
     ///
     /// # Errors
     /// When its compliance cannot be formed.
-    pub fn of(mut scene: Scene, object: Object) -> Result<Self, BakeError> {
+    pub fn of(mut scene: Scene, object: Object) -> Result<Self, Error> {
         let follows = scene.contact.law != ContactLaw::Rest;
         scene.contact.law = ContactLaw::Rest;
         let direct = Direct::of(&scene, object)?;
@@ -96,14 +97,19 @@ impl LiveScene {
         )
     }
 
-    /// Greatest stiffness of the torque relative to `slopes` that was seen at the configurations looked at, as
-    /// [`TorqueField::relative_stiffness`](crate::field::TorqueField::relative_stiffness) has it (1).
+    /// Greatest stiffness of the torque relative to `slopes` that was seen in shallow contact at the configurations
+    /// looked at: the greatest eigenvalue of `S^-1/2 H S^-1/2`, S = diag(slopes), H = -d tau/d q (1). A step of the loop
+    /// errs by half of H in its direction: where that is negative, and next to a ridge of the depth it has no bound, the
+    /// step takes energy.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
+        let joints = slopes.len();
         let relative = |tangent: &JointMatrix| {
-            let entry = |a: usize, b: usize| tangent[a][b].powi(2) / (slopes[a] * slopes[b]);
-            let rows = (0..slopes.len()).map(|a| (0..slopes.len()).map(|b| entry(a, b)).sum::<f64>());
-            rows.sum::<f64>().sqrt()
+            let mut stiffness = JointMatrix::default();
+            for (a, b) in (0..joints).flat_map(|a| (0..joints).map(move |b| (a, b))) {
+                stiffness[a][b] = -0.5 * (tangent[a][b] + tangent[b][a]) / (slopes[a] * slopes[b]).sqrt();
+            }
+            greatest_eigenvalue(&stiffness, joints)
         };
         self.tangents.iter().map(relative).fold(0.0, f64::max)
     }
@@ -126,14 +132,17 @@ fn region(scene: &Scene, is_known: bool) -> Grid {
     Grid { axes: axes.collect() }
 }
 
-/// The tangents at some of `configurations`, spread over them, where there is contact.
+/// The tangents at some of `configurations`, spread over them, where there is shallow contact: next to the middle of the
+/// object, where the depth has its ridges, they are as large as one is near.
 fn tangents(model: &Model<'_>, configurations: &[JointVector]) -> Vec<JointMatrix> {
     let mut model = model.clone();
     model.with_tangent = true;
     let every = configurations.len().div_ceil(STIFFNESS_SAMPLES).max(1);
     let some: Vec<JointVector> = configurations.iter().step_by(every).copied().collect();
     let solvers = Solvers::new(&model, rayon::current_num_threads());
-    solvers.map(&some, |solver, q| solver.solve(q).tangent).into_iter().flatten().collect()
+    let depth = shallow(model.object);
+    let tangent = |found: Equilibrium| found.tangent.filter(|_| -found.gap <= depth);
+    solvers.map(&some, |solver, q| tangent(solver.solve(q))).into_iter().flatten().collect()
 }
 
 /// The contact of a [`LiveScene`] in one session.

@@ -17,8 +17,8 @@
 //!
 //! `ObjectMotion::load` and `ObjectMotion::advance` are the twins of the entry points in `shaders/frame.wgsl`.
 
-use super::graphics_error::GraphicsError;
 use crate::{
+    Error, error,
     object::{Factor, Object, Stiffening, settled},
     scene::GraphicsEffects,
 };
@@ -61,9 +61,9 @@ impl<'object> ObjectMotion<'object> {
     ///
     /// # Errors
     /// When `period` is not positive, or there is no memory for the factor or no threads for a large one.
-    pub fn new(object: &'object Object, period: f64, effects: &GraphicsEffects) -> Result<Self, GraphicsError> {
+    pub fn new(object: &'object Object, period: f64, effects: &GraphicsEffects) -> Result<Self, Error> {
         if !(period > 0.0 && period.is_finite()) {
-            return Err(GraphicsError::Period(period));
+            return Err(error!("the time between frames is {period} s; it must be a positive number"));
         }
         let zero = vec![DVec3::ZERO; object.moved.len()];
         let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
@@ -84,7 +84,8 @@ impl<'object> ObjectMotion<'object> {
         let factor = dynamics.as_ref().map_or(&object.factor, |dynamics| &dynamics.factor);
         let threads =
             factor.is_shared().then(|| ThreadPoolBuilder::new().thread_name(|k| format!("frame {k}")).build());
-        let threads = threads.transpose().map_err(|error| GraphicsError::Threads(error.to_string()))?;
+        let threads =
+            threads.transpose().map_err(|error| error!("no threads can be had for the object's frames: {error}"))?;
         Ok(Self { object, period, dynamics, stiffening, weight, displacement, right: zero, threads })
     }
 

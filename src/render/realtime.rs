@@ -7,14 +7,15 @@
 use super::{
     graphics::Graphics,
     haptic::Haptics,
-    session::{Driver, Frames, Latest, Plan, SessionError},
+    session::{Driver, Frames, Latest, Plan, cannot_start},
     timing::{Durations, Percentiles, Timing},
     trace::{Tick, Trace},
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     control::{Clock, Paced, Patience, beside, real_time},
     device::{Device, Halt},
+    error,
 };
 use std::{
     sync::atomic::{AtomicBool, Ordering},
@@ -97,17 +98,17 @@ pub fn run(
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
     options: Options<'_>,
-) -> Result<(Trace, Timing), SessionError> {
+) -> Result<(Trace, Timing), Error> {
     let Options { stop, mut on_tick } = options;
     let goes_on = || (!stop.load(Ordering::Relaxed)).then_some(Patience::Spins);
-    let clock = Clock::of(device, haptics.period(), RATE, &goes_on)?;
+    let clock = Clock::of(device, haptics.period(), RATE, &goes_on).map_err(cannot_start)?;
     let mut driver = Driver::new(haptics, device)?;
     let (mut recorder, Ends { ticks, latest }) = Recorder::new(haptics.joints());
     let start = *driver.start();
-    let frame_cost = Durations::new().ok_or_else(|| SessionError::Resources("no memory for histograms".into()))?;
+    let frame_cost = Durations::new().ok_or_else(|| cannot_start("no memory for histograms"))?;
     let mut recorded = plan.new_ticks()?;
     let over = AtomicBool::new(false);
-    let resources = |error: std::io::Error| SessionError::Resources(error.to_string());
+    let panicked = |thread: &str| error!("the {thread} thread ended unexpectedly");
     thread::scope(|scope| {
         let drawing = graphics.map(|graphics| {
             let frames = Frames::new(graphics, plan);
@@ -116,7 +117,7 @@ pub fn run(
                 .name("graphics".into())
                 .spawn_scoped(scope, move || draw(frames, latest, frame_cost, over))
         });
-        let drawing = drawing.transpose().map_err(resources)?;
+        let drawing = drawing.transpose().map_err(cannot_start)?;
         let work = || {
             let timing = driver.run(clock, |_, record, paced| {
                 let has_stopped = record.0.applied.halt.is_some_and(Halt::is_final);
@@ -133,8 +134,8 @@ pub fn run(
             recorded.push(tick);
         });
         over.store(true, Ordering::Release);
-        let mut timing = felt.map_err(resources)?.map_err(|_| SessionError::Thread("haptic"))?;
-        let drawn = drawing.map(|thread| thread.join().map_err(|_| SessionError::Thread("graphics"))).transpose()?;
+        let mut timing = felt.map_err(cannot_start)?.map_err(|_| panicked("haptic"))?;
+        let drawn = drawing.map(|thread| thread.join().map_err(|_| panicked("graphics"))).transpose()?;
         real_time::unlock_memory();
         timing.stolen = real_time::stolen().zip(stolen_before).map(|(after, before)| after - before);
         let mut frames = Vec::new();

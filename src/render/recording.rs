@@ -13,13 +13,13 @@ use super::{
     columns::{RECORDED, head, number, read, read_vector, width, write, write_vector},
     graphics::Graphics,
     haptic::Haptics,
-    session::{Driver, Frames, HapticController, Latest, Plan, SessionError, collect},
+    session::{Driver, Frames, HapticController, Latest, Plan, collect},
     trace::{Tick, Trace},
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     control::Clock,
-    csv::{Lines, Table, TableError},
+    csv::{Lines, Table},
     dataset::JointLabel,
     device::{Applied, Device, Reading},
 };
@@ -88,7 +88,7 @@ impl Recording {
     ///
     /// # Errors
     /// When the file cannot be read or is no such recording; the error names file and line.
-    pub fn read(file: &Path, joints: usize) -> Result<Self, TableError> {
+    pub fn read(file: &Path, joints: usize) -> Result<Self, Error> {
         let mut lines = Lines::open(file, GREATEST_FILE, REMEDY)?;
         let mut recording = Self::default();
         let (mut line, mut header) = (Vec::new(), false);
@@ -126,7 +126,7 @@ impl Recording {
         haptics: &Haptics,
         graphics: Option<&mut Graphics<'_>>,
         joints: Vec<JointLabel>,
-    ) -> Result<Trace, SessionError> {
+    ) -> Result<Trace, Error> {
         let mut device = Playback { recording: self, next: None };
         let mut driver = Driver::new(haptics, &mut device)?;
         let plan = Plan { joints, ticks: self.ticks.len(), snapshots: self.kept.clone() };

@@ -6,22 +6,24 @@
 //! first tick at or after `j T_g`, from the proxy's configuration then.
 
 use super::{
-    flags::Fault,
-    graphics::{Graphics, GraphicsError},
+    graphics::Graphics,
     haptic::{Haptics, Inputs, State},
     source::ContactSession,
     trace::{Frame, Tick, Trace},
 };
 use crate::{
-    JointVector,
-    control::{Clock, ClockError, ControlLoop, Controller},
+    Error, JointVector,
+    control::{Clock, ControlLoop, Controller},
     dataset::JointLabel,
     device::{Applied, Device, Reading},
-    memory,
+    error, memory,
 };
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
+use std::{
+    fmt::Display,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 /// How long, and what to keep of the object's shape.
@@ -35,25 +37,9 @@ pub struct Plan {
     pub snapshots: Vec<f64>,
 }
 
-/// A session cannot run.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SessionError {
-    /// The device's first position is none.
-    #[error("the session cannot start: {0}")]
-    Start(#[from] Fault),
-    /// There is no clock.
-    #[error("the session cannot start: {0}")]
-    Clock(#[from] ClockError),
-    /// The object cannot be drawn.
-    #[error(transparent)]
-    Graphics(#[from] GraphicsError),
-    /// The system gives no thread or memory.
-    #[error("the session cannot start: {0}")]
-    Resources(String),
-    /// A thread ended by a panic.
-    #[error("the {0} thread ended unexpectedly")]
-    Thread(&'static str),
+/// The error of a session for which something is missing.
+pub(crate) fn cannot_start(why: impl Display) -> Error {
+    error!("the session cannot start: {why}")
 }
 
 /// The part of a tick that graphics needs.
@@ -107,11 +93,11 @@ impl Plan {
     }
 
     /// Room for all ticks.
-    pub(super) fn new_ticks(&self) -> Result<Vec<Tick>, SessionError> {
+    pub(super) fn new_ticks(&self) -> Result<Vec<Tick>, Error> {
         memory::check(self.ticks.saturating_mul(size_of::<Tick>()))
-            .map_err(|shortage| SessionError::Resources(format!("{} ticks: {shortage}", self.ticks)))?;
+            .map_err(|shortage| cannot_start(format_args!("{} ticks: {shortage}", self.ticks)))?;
         let mut ticks = Vec::new();
-        ticks.try_reserve_exact(self.ticks).map_err(|error| SessionError::Resources(error.to_string()))?;
+        ticks.try_reserve_exact(self.ticks).map_err(cannot_start)?;
         Ok(ticks)
     }
 }
@@ -121,9 +107,9 @@ impl<'session> Driver<'session> {
     ///
     /// # Errors
     /// When the device reports no position.
-    pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<Self, SessionError> {
+    pub fn new(haptics: &'session Haptics, device: &'session mut dyn Device) -> Result<Self, Error> {
         let start = device.read(0.0).position;
-        let state = haptics.start(&start)?;
+        let state = haptics.start(&start).map_err(cannot_start)?;
         let (contact, clear) = (haptics.source().begin(), ClearFault::default());
         Ok(Self::of(HapticController { haptics, state, contact, start, tick: None, clear }, device))
     }
@@ -252,7 +238,7 @@ pub fn run(
     device: &mut dyn Device,
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
-) -> Result<Trace, SessionError> {
+) -> Result<Trace, Error> {
     let (driver, period) = (Driver::new(haptics, device)?, haptics.period());
     let start = *driver.start();
     let as_due =
@@ -276,7 +262,7 @@ pub(super) fn collect<'session>(
     graphics: Option<&mut Graphics<'_>>,
     plan: &Plan,
     mut each: impl FnMut(&mut HapticController<'session>, &mut Tick, Option<&mut Frames<'_, '_>>, &Latest) + Send,
-) -> Result<(Vec<Tick>, Vec<Frame>), SessionError> {
+) -> Result<(Vec<Tick>, Vec<Frame>), Error> {
     let mut frames = graphics.map(|graphics| Frames::new(graphics, plan));
     let mut ticks = plan.new_ticks()?;
     if plan.ticks > 0 {

@@ -2,25 +2,26 @@
 //! its surface the object. A scene that is solved live is rendered like a dataset in which nothing is stored.
 
 use super::{
-    graphics::{ContactForces, Graphics, GraphicsError},
-    haptic::{Haptics, JointsError},
+    graphics::{ContactForces, Graphics},
+    haptic::Haptics,
     live::LiveScene,
-    npmi::{InertiaError, Npmi},
+    npmi::Npmi,
     own_motion,
     passivity::{self, Bound},
     session::Plan,
     source::TorqueSource,
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     dataset::{Dataset, Grid, JointLabel},
-    device::{HandError, Motion, SimulatedHand},
-    field::{FieldError, TorqueField, range::HaptizedRange},
-    object::{Object, ObjectError},
+    device::{Motion, SimulatedHand},
+    error,
+    field::{TorqueField, range::HaptizedRange},
+    object::Object,
     proxy::Chain,
     scene::{
         BOUNDARY_SLOPE, Diagnostic, HapticsSpec, Interpolation, LEVER_ARM, LINEAR_RELAXATION, ProxyInertia, Rendering,
-        SceneError, THRESHOLD,
+        THRESHOLD,
     },
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -47,62 +48,12 @@ pub struct Setup {
     live: Option<Arc<LiveScene>>,
 }
 
-/// A dataset cannot be rendered.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SetupError {
-    /// The dataset has no scene: no chain, no gains.
-    #[error("the dataset holds no scene, so that its proxy and gains are not known: bake or gridize it with one")]
-    NoScene,
-    /// The scene in the dataset is not valid.
-    #[error("the scene in the dataset: {0}")]
-    Scene(#[from] SceneError),
-    /// Scene and grid do not belong together.
-    #[error("the dataset's grid has {grid} axes and the proxy of its scene {chain} joints: bake it again")]
-    Joints {
-        /// Axes of the grid.
-        grid: usize,
-        /// Joints of the chain.
-        chain: usize,
-    },
-    /// Scene and dataset contradict each other.
-    #[error("the dataset contradicts itself: {0}: bake it again")]
-    Contradiction(String),
-    /// Scene and dataset do not make a loop.
-    #[error(transparent)]
-    Loop(#[from] JointsError),
-    /// An effect that the scene names cannot act.
-    #[error("the scene in the dataset: {0}")]
-    Effect(#[from] Diagnostic),
-    /// An effect on what is drawn, and nothing to draw.
-    #[error(
-        "the scene in the dataset: {0} acts on the object that contact forces move, and the dataset does not hold the \
-         contact forces and the surface of one: bake a virtual object again with this scene, or leave {0} out"
-    )]
-    NothingDrawn(&'static str),
-    /// The torques cannot be interpolated.
-    #[error(transparent)]
-    Field(#[from] FieldError),
-    /// The proxy cannot be integrated.
-    #[error(transparent)]
-    Inertia(#[from] InertiaError),
-    /// The object cannot be built.
-    #[error("the object in the dataset: {0}")]
-    Object(#[from] ObjectError),
-    /// The hand cannot be simulated.
-    #[error(transparent)]
-    Hand(#[from] HandError),
-    /// The object cannot be drawn.
-    #[error(transparent)]
-    Graphics(#[from] GraphicsError),
-}
-
 impl Setup {
     /// Builds all that rendering `dataset` needs.
     ///
     /// # Errors
     /// When the dataset has no valid scene, or its parts do not fit.
-    pub fn new(dataset: &Dataset) -> Result<Self, SetupError> {
+    pub fn new(dataset: &Dataset) -> Result<Self, Error> {
         Self::of(dataset, None)
     }
 
@@ -110,21 +61,26 @@ impl Setup {
     ///
     /// # Errors
     /// As [`Setup::new`].
-    pub fn live(scene: Arc<LiveScene>, dataset: &Dataset) -> Result<Self, SetupError> {
+    pub fn live(scene: Arc<LiveScene>, dataset: &Dataset) -> Result<Self, Error> {
         Self::of(dataset, Some(scene))
     }
 
-    fn of(dataset: &Dataset, live: Option<Arc<LiveScene>>) -> Result<Self, SetupError> {
+    fn of(dataset: &Dataset, live: Option<Arc<LiveScene>>) -> Result<Self, Error> {
         if dataset.scene.trim().is_empty() {
-            return Err(SetupError::NoScene);
+            return Err(
+                "the dataset holds no scene, so that its proxy and gains are not known: bake or gridize it with one"
+                    .into(),
+            );
         }
-        let mut scene = Rendering::parse(&dataset.scene, "scene")?;
+        let mut scene = scene_of(dataset)?;
         let chain = Chain::new(&scene.proxy);
         let (grid, joints) = (dataset.grid.joints(), chain.joints.len());
         if grid != joints {
-            return Err(SetupError::Joints { grid, chain: joints });
+            return Err(error!(
+                "the dataset's grid has {grid} axes and the proxy of its scene {joints} joints: bake it again"
+            ));
         }
-        dataset.check_scene().map_err(SetupError::Contradiction)?;
+        dataset.check_scene().map_err(|what| error!("the dataset contradicts itself: {what}: bake it again"))?;
         let made_motions = own_motion::add(&mut scene, dataset);
         let Loop { haptics, bounds, gains, advice } =
             haptic_loop(dataset, &chain, &scene, &scene.haptics, live.as_ref())?;
@@ -133,9 +89,18 @@ impl Setup {
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
         let is_known = live.is_some() || ContactForces::known(dataset);
         let object = match (&scene.object, &scene.graphics, &dataset.surface) {
-            (Some(object), Some(_), Some(surface)) if is_known => Some(surface.object(object)?),
+            (Some(object), Some(_), Some(surface)) if is_known => {
+                let object = surface.object(object);
+                Some(object.map_err(|error| error.within("the object in the dataset"))?)
+            }
             _ => match scene.graphics.and_then(|graphics| graphics.effects.named()) {
-                Some(effect) => return Err(SetupError::NothingDrawn(effect)),
+                Some(effect) => {
+                    return Err(error!(
+                        "the scene in the dataset: {effect} acts on the object that contact forces move, and the dataset \
+                         does not hold the contact forces and the surface of one: bake a virtual object again with this \
+                         scene, or leave {effect} out"
+                    ));
+                }
                 None => None,
             },
         };
@@ -148,7 +113,7 @@ impl Setup {
     ///
     /// # Errors
     /// When they do not make a loop.
-    pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<String>), SetupError> {
+    pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<String>), Error> {
         let live = self.live.as_ref();
         let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, live)?;
         Ok((haptics, advice))
@@ -158,15 +123,15 @@ impl Setup {
     ///
     /// # Errors
     /// When motion and device do not fit.
-    pub fn hand(&self, motion: Motion) -> Result<SimulatedHand, SetupError> {
-        Ok(SimulatedHand::new(&self.scene.haptics, motion)?)
+    pub fn hand(&self, motion: Motion) -> Result<SimulatedHand, Error> {
+        SimulatedHand::new(&self.scene.haptics, motion)
     }
 
     /// The graphics loop of `dataset`, from which this was made; absent where the scene has none.
     ///
     /// # Errors
     /// When the dataset's contact forces do not fit the object.
-    pub fn graphics(&self, dataset: &Dataset) -> Result<Option<Graphics<'_>>, SetupError> {
+    pub fn graphics(&self, dataset: &Dataset) -> Result<Option<Graphics<'_>>, Error> {
         match (&self.object, &self.scene.graphics, self.contact_forces(dataset)?) {
             (Some(object), Some(graphics), Some(forces)) => Ok(Some(Graphics::new(forces, object, graphics)?)),
             _ => Ok(None),
@@ -177,7 +142,7 @@ impl Setup {
     ///
     /// # Errors
     /// When the dataset's do not fit the object.
-    pub fn contact_forces(&self, dataset: &Dataset) -> Result<Option<ContactForces>, SetupError> {
+    pub fn contact_forces(&self, dataset: &Dataset) -> Result<Option<ContactForces>, Error> {
         let Some(object) = &self.object else { return Ok(None) };
         Ok(Some(match &self.live {
             Some(scene) => ContactForces::live(Arc::clone(scene)),
@@ -197,7 +162,7 @@ impl Setup {
 ///
 /// # Errors
 /// When its scene is not valid, or the dataset lacks what the interpolation needs.
-pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<TorqueField, SetupError> {
+pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<TorqueField, Error> {
     let (scene, threshold, slope);
     if dataset.scene.trim().is_empty() {
         let mut slopes = JointVector::zeros(dataset.grid.joints());
@@ -207,11 +172,24 @@ pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<
         });
         (scene, threshold, slope) = (Interpolation::Linear, THRESHOLD, slopes);
     } else {
-        let haptics = Rendering::parse(&dataset.scene, "scene")?.haptics;
+        let haptics = scene_of(dataset)?.haptics;
         (scene, threshold, slope) = (haptics.interpolation, haptics.threshold, haptics.boundary_slope);
     }
-    Ok(TorqueField::interpolated(dataset, interpolation.unwrap_or(scene), threshold, &slope)?)
+    TorqueField::interpolated(dataset, interpolation.unwrap_or(scene), threshold, &slope)
 }
+
+/// The scene in `dataset`.
+fn scene_of(dataset: &Dataset) -> Result<Rendering, Error> {
+    Rendering::parse(&dataset.scene, "scene").map_err(|error| Error::from(error).within(IN_DATASET))
+}
+
+/// The error of a scene in a dataset that names at `key` what cannot act.
+fn refused(scene: &Rendering, key: &str, message: String) -> Error {
+    Error::from(Diagnostic::at(&scene.path, &scene.text, key, message)).within(IN_DATASET)
+}
+
+/// Where such a scene stands.
+const IN_DATASET: &str = "the scene in the dataset";
 
 /// A haptic loop and what is known of its gains.
 struct Loop {
@@ -230,7 +208,7 @@ fn haptic_loop(
     scene: &Rendering,
     gains: &HapticsSpec,
     live: Option<&Arc<LiveScene>>,
-) -> Result<Loop, SetupError> {
+) -> Result<Loop, Error> {
     let (source, range) = match live {
         Some(scene) => (TorqueSource::Live(Arc::clone(scene)), HaptizedRange::of_grid(scene.grid())),
         None => {
@@ -252,7 +230,7 @@ fn haptic_loop(
     let bounds = passivity::bounds(&gains, &source, &labels(&dataset.grid));
     let advice = passivity::advice(&gains, &source, &bounds);
     if gains.relaxation.is_some() && !source.is_potential() {
-        return Err(Diagnostic::at(&scene.path, &scene.text, "object.relaxation", LINEAR_RELAXATION.to_owned()).into());
+        return Err(refused(scene, "object.relaxation", LINEAR_RELAXATION.to_owned()));
     }
     if gains.uses_slip() && !source.has_slip() {
         let (name, place) = match gains.friction {
@@ -263,7 +241,7 @@ fn haptic_loop(
             "{name} needs to know how contacts slip, which the dataset does not hold: bake a virtual object again with \
              this scene; scan a real one with strokes aside ([scan.history]), or leave {name} out"
         );
-        return Err(Diagnostic::at(&scene.path, &scene.text, place, message).into());
+        return Err(refused(scene, place, message));
     }
     let haptics = Haptics::new(source, npmi, &gains)?.with_range(range);
     Ok(Loop { haptics, bounds, gains, advice })
@@ -335,6 +313,6 @@ mod tests {
         assert!(found.sample(&[0.33, 0.033]).contact);
         assert!(field(&data, Some(Interpolation::Potential)).unwrap().is_potential());
         data.scene = "not a scene".into();
-        assert!(matches!(field(&data, None), Err(SetupError::Scene(_))));
+        assert_eq!(field(&data, None).err().map(|error| error.kind()), Some(crate::ErrorKind::Scene));
     }
 }

@@ -240,7 +240,7 @@ fn links(dataset: &Dataset) -> Vec<(Option<usize>, Triangles)> {
 }
 
 /// Draws the links with their shapes, and those that have none from joint to joint, with the contact nodes on them.
-pub(super) fn draw_proxy(
+pub(crate) fn draw_proxy(
     raster: &mut Raster,
     chain: &Chain,
     pose: &Pose,

@@ -1,6 +1,7 @@
 //! Records of a chunk of an MCAP file, taken out of their compression.
 
-use super::{RECOVER, RosError};
+use super::RECOVER;
+use crate::Error;
 use std::{borrow::Cow, io::Read, path::Path};
 
 /// Longest record or chunk that is read (bytes): a chunk of a recorder's is a few MiB.
@@ -23,10 +24,10 @@ impl<'a> Chunk<'a> {
     /// a small file cannot fill the memory.
     ///
     /// # Errors
-    /// [`RosError::Mcap`] if they are too long, are not as long as stated, do not match their checksum, or are in no
+    /// When they are too long, are not as long as stated, do not match their checksum, or are in no
     /// compression that is known.
-    pub fn records(self, file: &Path) -> Result<Cow<'a, [u8]>, RosError> {
-        let refuse = |what: String| RosError::Mcap { file: file.to_owned(), what };
+    pub fn records(self, file: &Path) -> Result<Cow<'a, [u8]>, Error> {
+        let refuse = |what: String| Error::at(file, what);
         if self.size > LONGEST_RECORD {
             return Err(refuse(format!(
                 "a chunk holds {} bytes, and at most {LONGEST_RECORD} are read: write it with smaller chunks by `mcap \
@@ -40,7 +41,7 @@ impl<'a> Chunk<'a> {
         let taken = |reader: &mut dyn Read| {
             let mut records = Vec::new();
             reader.take(self.size + 1).read_to_end(&mut records).map_err(|error| broken(&error))?;
-            Ok(Cow::Owned(records))
+            Ok::<_, Error>(Cow::Owned(records))
         };
         let records = match self.compression {
             b"" => Cow::Borrowed(self.content),

@@ -1,7 +1,7 @@
 //! The way that joints went, from an MCAP file.
 
-use super::{HAND_TOPIC, JointState, RosError, messages::Messages, table};
-use crate::JointVector;
+use super::{HAND_TOPIC, JointState, messages::Messages, table};
+use crate::{Error, JointVector};
 use std::path::Path;
 
 /// Most samples that are read: an hour at 1 kHz.
@@ -23,9 +23,9 @@ impl Course {
     /// of the hand in a session of haptize, or the only one.
     ///
     /// # Errors
-    /// [`RosError`] if the file cannot be read, the topic is not there or not unique, a message is none, or none names
+    /// When the file cannot be read, the topic is not there or not unique, a message is none, or none names
     /// all the joints.
-    pub fn read(path: &Path, topic: Option<&str>, joints: &[String]) -> Result<Self, RosError> {
+    pub fn read(path: &Path, topic: Option<&str>, joints: &[String]) -> Result<Self, Error> {
         let topic = match topic {
             None if super::topics(path)?.iter().any(|topic| topic.name == HAND_TOPIC) => HAND_TOPIC.to_owned(),
             topic => table::chosen(path, topic)?,
@@ -46,7 +46,7 @@ impl Course {
             }
             if rows.len() > MOST_SAMPLES {
                 let what = format!("the topic has more than {MOST_SAMPLES} of them, an hour at 1 kHz: cut the file");
-                return Err(RosError::Message { file: path.to_owned(), topic: course.topic, number, what });
+                return Err(table::no_state(path, &course.topic, number, &what));
             }
         }
         // Where no stamp says anything, the time counts at which messages were logged.
@@ -69,7 +69,7 @@ impl Course {
                 joints.join(", "),
                 if names.is_empty() { "none".to_owned() } else { names.join(", ") }
             );
-            return Err(RosError::Mcap { file: path.to_owned(), what });
+            return Err(Error::at(path, what));
         }
         Ok(course)
     }

@@ -5,11 +5,11 @@
 //! than its chunk for one that is not. Memory is that of the longest record or chunk.
 
 use super::{
-    MESSAGE_ENCODING, RECOVER, RosError, TYPE,
+    MESSAGE_ENCODING, RECOVER, TYPE,
     chunk::{Chunk, LONGEST_RECORD},
-    is_mcap,
+    is_mcap, refused,
 };
-use crate::{input, names::escaped};
+use crate::{Error, input, names::escaped};
 use mcap::{
     McapError,
     records::op,
@@ -47,11 +47,11 @@ struct Topics {
 }
 
 impl Messages {
-    pub fn open(path: &Path) -> Result<Self, RosError> {
-        let unreadable = |source| RosError::File { file: path.to_owned(), source };
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let unreadable = |source| Error::unreadable(path, &source);
         let file = input::open(path).map_err(unreadable)?;
         if !is_mcap(path) {
-            return Err(RosError::mcap(path, &McapError::BadMagic));
+            return Err(refused(path, &McapError::BadMagic));
         }
         // No record is longer than its file, whatever it says.
         let longest = file.metadata().map_err(unreadable)?.len().min(LONGEST_RECORD);
@@ -70,7 +70,7 @@ impl Messages {
     }
 
     /// Returns the next message; `None` at the end.
-    fn advance(&mut self) -> Result<Option<Logged>, RosError> {
+    fn advance(&mut self) -> Result<Option<Logged>, Error> {
         loop {
             while self.taken < self.chunk.len() {
                 let mut rest = Fields(&self.chunk[self.taken..]);
@@ -81,7 +81,7 @@ impl Messages {
                     return Ok(message);
                 }
             }
-            let failed = |error: McapError| RosError::mcap(&self.path, &error);
+            let failed = |error: McapError| refused(&self.path, &error);
             let Some(event) = self.reader.next_event() else { return Ok(None) };
             match event.map_err(failed)? {
                 LinearReadEvent::ReadRequest(length) => {
@@ -109,13 +109,12 @@ impl Messages {
 }
 
 /// The error of a file whose records are not as long as they say.
-fn damaged(path: &Path) -> RosError {
-    let what = format!("the file is damaged, a record is shorter than it says: {RECOVER}");
-    RosError::Mcap { file: path.to_owned(), what }
+fn damaged(path: &Path) -> Error {
+    Error::at(path, format_args!("the file is damaged, a record is shorter than it says: {RECOVER}"))
 }
 
 impl Iterator for Messages {
-    type Item = Result<Logged, RosError>;
+    type Item = Result<Logged, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.over {

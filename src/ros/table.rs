@@ -5,8 +5,8 @@
 //! empty field, which the import drops or refuses as its mapping says. Time is the message's stamp; if all stamps are
 //! zero, the time at which it was logged.
 
-use super::{JointState, MOST_JOINTS, RosError, TYPE, messages::Messages};
-use crate::{csv::plain, input};
+use super::{JointState, MOST_JOINTS, TYPE, messages::Messages};
+use crate::{Error, csv::plain, input};
 use std::{
     collections::BTreeMap,
     fmt::Write as _,
@@ -32,8 +32,8 @@ pub fn is_mcap(path: &Path) -> bool {
 /// Returns the topics of joint states in the file at `path`, by name.
 ///
 /// # Errors
-/// [`RosError`] if the file cannot be read.
-pub fn topics(path: &Path) -> Result<Vec<Topic>, RosError> {
+/// When the file cannot be read.
+pub fn topics(path: &Path) -> Result<Vec<Topic>, Error> {
     let mut counts: BTreeMap<String, u64> = BTreeMap::new();
     for message in Messages::open(path)? {
         *counts.entry(message?.0).or_default() += 1;
@@ -58,8 +58,8 @@ impl JointStateTable {
     /// Opens the table of `topic` in the file at `path`, or of its only one.
     ///
     /// # Errors
-    /// [`RosError`] if the file cannot be read, the topic is not there or not unique, or a message is none.
-    pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, RosError> {
+    /// When the file cannot be read, the topic is not there or not unique, or a message is none.
+    pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, Error> {
         let topic = chosen(path, topic)?;
         let (mut joints, mut numbers, mut stamped, mut number) = (Vec::new(), BTreeMap::new(), false, 0);
         let mut has_effort = false;
@@ -78,20 +78,20 @@ impl JointStateTable {
                 }
                 if joints.len() > MOST_JOINTS {
                     let what = format!("its messages name more than {MOST_JOINTS} joints");
-                    return Err(RosError::Message { file: path.to_owned(), topic, number, what });
+                    return Err(no_state(path, &topic, number, &what));
                 }
             }
         }
         if joints.is_empty() {
             let what = format!("no message of {topic} names a joint: give the joints names where they are published");
-            return Err(RosError::Mcap { file: path.to_owned(), what });
+            return Err(Error::at(path, what));
         }
         if !has_effort {
             let what = format!(
                 "none of the {number} messages of {topic} gives an effort, and a torque is made of it: record from a \
                  driver that publishes efforts"
             );
-            return Err(RosError::Mcap { file: path.to_owned(), what });
+            return Err(Error::at(path, what));
         }
         let mut text = "time".to_owned();
         for joint in &joints {
@@ -116,7 +116,7 @@ impl JointStateTable {
     }
 
     /// Puts the next message's row into `text`; false at the end.
-    fn next_row(&mut self) -> Result<bool, RosError> {
+    fn next_row(&mut self) -> Result<bool, Error> {
         let (logged, bytes) = loop {
             match self.messages.next().transpose()? {
                 None => return Ok(false),
@@ -161,23 +161,23 @@ impl Read for JointStateTable {
     }
 }
 
-pub(super) fn decode(path: &Path, topic: &str, number: u64, bytes: &[u8]) -> Result<JointState, RosError> {
-    JointState::decode(bytes).map_err(|what| RosError::Message {
-        file: path.to_owned(),
-        topic: topic.to_owned(),
-        number,
-        what,
-    })
+pub(super) fn decode(path: &Path, topic: &str, number: u64, bytes: &[u8]) -> Result<JointState, Error> {
+    JointState::decode(bytes).map_err(|what| no_state(path, topic, number, &what))
+}
+
+/// The error of message `number`, counted from one, of `topic`.
+pub(super) fn no_state(path: &Path, topic: &str, number: u64, what: &str) -> Error {
+    Error::at(path, format_args!("message {number} of {topic} is no {TYPE}: {what}"))
 }
 
 /// Returns the topic to read: `topic`, or the only one.
-pub(super) fn chosen(path: &Path, topic: Option<&str>) -> Result<String, RosError> {
+pub(super) fn chosen(path: &Path, topic: Option<&str>) -> Result<String, Error> {
     let topics = topics(path)?;
     let wrong = |what: &str| {
         let listed: Vec<String> =
             topics.iter().map(|topic| format!("{} ({} messages)", topic.name, topic.messages)).collect();
         let topics = if listed.is_empty() { "none".to_owned() } else { listed.join(", ") };
-        RosError::Topic { file: path.to_owned(), what: what.to_owned(), topics }
+        Error::at(path, format_args!("{what}; its topics of joint states: {topics}"))
     };
     match (topic, topics.as_slice()) {
         (Some(name), topics) if topics.iter().any(|topic| topic.name == name) => Ok(name.to_owned()),

@@ -7,8 +7,8 @@
 //! subtracted), standard deviation of a single tick's torque, ticks averaged, status.
 
 use crate::{
-    JointVector, MAX_JOINTS,
-    csv::{LONGEST_LINE, Lines, Table, TableError},
+    Error, JointVector, MAX_AXES,
+    csv::{LONGEST_LINE, Lines, Table},
     dataset::JointLabel,
     gridize::{ForceHistory, Samples},
     input,
@@ -118,33 +118,10 @@ pub struct LogWriter {
     file: BufWriter<File>,
 }
 
-/// A log cannot be read, continued or written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LogError {
-    /// The system refused.
-    #[error("{}: cannot be read or written: {source}; check the path, its permissions \
-     and the room left", .path.display())]
-    File {
-        /// The log.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: io::Error,
-    },
-    /// The log is there already.
-    #[error("{}: exists already; continue it with --resume, or name another file", .0.display())]
-    Exists(PathBuf),
-    /// Another scene's log.
-    #[error("{}: the log was made with another scene or rig, or one with a plan and \
-     one led by hand; it cannot be continued with this one", .0.display())]
-    OtherScene(PathBuf),
-    /// Not a scan log.
-    #[error("{}: not a scan log (its first line is not `{SIGNATURE}`); \
-     other tables need a column mapping (--columns)", .0.display())]
-    Foreign(PathBuf),
-    /// The file cannot be read, or a line of it is wrong.
-    #[error(transparent)]
-    Table(#[from] TableError),
+/// The error of the log at `path`, which the system refuses to read or to write.
+fn failed(path: &Path, source: &io::Error) -> Error {
+    let remedy = "check the path, its permissions and the room left";
+    Error::at(path, format_args!("cannot be read or written: {source}; {remedy}"))
 }
 
 impl LogHeader {
@@ -185,12 +162,14 @@ impl LogWriter {
     ///
     /// # Errors
     /// When there is a file already, or it cannot be made.
-    pub fn create(path: &Path, header: &LogHeader) -> Result<Self, LogError> {
-        let failed = |source: io::Error| match source.kind() {
-            io::ErrorKind::AlreadyExists => LogError::Exists(path.to_owned()),
-            _ => LogError::File { path: path.to_owned(), source },
+    pub fn create(path: &Path, header: &LogHeader) -> Result<Self, Error> {
+        let refused = |source: io::Error| match source.kind() {
+            io::ErrorKind::AlreadyExists => {
+                Error::at(path, "exists already; continue it with --resume, or name another file")
+            }
+            _ => failed(path, &source),
         };
-        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
+        let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(refused)?;
         let mut writer = Self { path: path.to_owned(), file: BufWriter::new(file) };
         writer.write(&header.text())?;
         Ok(writer)
@@ -200,15 +179,17 @@ impl LogWriter {
     ///
     /// # Errors
     /// When it cannot be read, or its header is not `header`.
-    pub fn resume(path: &Path, header: &LogHeader) -> Result<(Self, Vec<ScanRow>), LogError> {
-        let failed = |source| LogError::File { path: path.to_owned(), source };
+    pub fn resume(path: &Path, header: &LogHeader) -> Result<(Self, Vec<ScanRow>), Error> {
+        let failed = |source| failed(path, &source);
         let mut file = OpenOptions::new().read(true).write(true).open(path).map_err(failed)?;
         let whole = whole_lines(&mut file).map_err(failed)?;
         // Nothing is cut off before it is known that the file is this scan's log.
         file.rewind().map_err(failed)?;
         let log = ScanLog::parse(path, (&file).take(whole))?;
         if log.header != *header {
-            return Err(LogError::OtherScene(path.to_owned()));
+            let what = "the log was made with another scene or rig, or one with a plan and one led by hand; it cannot be \
+                        continued with this one";
+            return Err(Error::at(path, what));
         }
         file.set_len(whole).map_err(failed)?;
         file.seek(SeekFrom::End(0)).map_err(failed)?;
@@ -219,14 +200,14 @@ impl LogWriter {
     ///
     /// # Errors
     /// Those of the file.
-    pub fn append(&mut self, row: &ScanRow) -> Result<(), LogError> {
+    pub fn append(&mut self, row: &ScanRow) -> Result<(), Error> {
         let written = write_row(row, &mut self.file).and_then(|()| self.file.flush());
-        written.map_err(|source| LogError::File { path: self.path.clone(), source })
+        written.map_err(|source| failed(&self.path, &source))
     }
 
-    fn write(&mut self, text: &str) -> Result<(), LogError> {
+    fn write(&mut self, text: &str) -> Result<(), Error> {
         let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush());
-        written.map_err(|source| LogError::File { path: self.path.clone(), source })
+        written.map_err(|source| failed(&self.path, &source))
     }
 }
 
@@ -268,24 +249,24 @@ impl ScanLog {
     /// Reads the log at `path`.
     ///
     /// # Errors
-    /// [`LogError`] names the file and the line.
-    pub fn read(path: &Path) -> Result<Self, LogError> {
-        let file = input::open(path).map_err(|source| LogError::File { path: path.to_owned(), source })?;
+    /// The error names the file and the line.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let file = input::open(path).map_err(|source| failed(path, &source))?;
         Self::parse(path, file)
     }
 
     /// Reads `file`, which is at `path`, from where it stands.
-    fn parse(path: &Path, file: impl Read) -> Result<Self, LogError> {
+    fn parse(path: &Path, file: impl Read) -> Result<Self, Error> {
         let mut lines = Lines::new(path, BufReader::new(file));
         let mut log = Self::default();
         let (mut text, mut has_columns) = (Vec::new(), false);
-        loop {
-            let line = match lines.next_text(&mut text) {
-                Ok(None) => break,
-                Ok(Some(line)) if lines.number > 1 || line == SIGNATURE => line,
-                Ok(Some(_)) | Err(TableError::Line { line: 1, .. }) => return Err(LogError::Foreign(path.to_owned())),
-                Err(error) => return Err(error.into()),
-            };
+        if lines.next(&mut text)?.is_some_and(|line| line != SIGNATURE.as_bytes()) {
+            let what = format!(
+                "not a scan log (its first line is not `{SIGNATURE}`); other tables need a column mapping (--columns)"
+            );
+            return Err(Error::at(path, what));
+        }
+        while let Some(line) = lines.next_text(&mut text)? {
             let bad = |message: String| lines.error(message);
             if let Some(scene) = line.strip_prefix(SCENE.trim_end()) {
                 log.header.scene += scene.strip_prefix(' ').unwrap_or(scene);
@@ -301,13 +282,13 @@ impl ScanLog {
                 log.header.joints = labels(line).map_err(bad)?;
                 has_columns = true;
             } else if log.rows.len() == MOST_ROWS {
-                return Err(bad(format!("more than {MOST_ROWS} rows")).into());
+                return Err(bad(format!("more than {MOST_ROWS} rows")));
             } else {
                 log.rows.push(row(line, log.header.joints.len()).map_err(bad)?);
             }
         }
         if !has_columns {
-            return Err(lines.error("the log ends before its first row").into());
+            return Err(lines.error("the log ends before its first row"));
         }
         Ok(log)
     }
@@ -363,7 +344,7 @@ fn labels(line: &str) -> Result<Vec<JointLabel>, String> {
             Some(JointLabel { name: name.to_owned(), unit: unit.to_owned() })
         })
         .collect();
-    let joints = joints.filter(|joints| (1..=MAX_JOINTS).contains(&joints.len())).ok_or_else(wrong)?;
+    let joints = joints.filter(|joints| (1..=MAX_AXES).contains(&joints.len())).ok_or_else(wrong)?;
     let header = LogHeader { joints, ..LogHeader::default() };
     if header.columns() == line { Ok(header.joints) } else { Err(wrong()) }
 }
@@ -439,7 +420,7 @@ mod tests {
         let log = ScanLog::read(&path).unwrap();
         assert_eq!((&log.header, &log.rows[..]), (&header(), &[row(0), row(1), row(2)][..]));
         assert_eq!(log.samples().configurations, [0.0, 0.0, 2.0, -2.0 / 3.0]);
-        assert!(matches!(LogWriter::create(&path, &header()), Err(LogError::Exists(_))));
+        assert!(LogWriter::create(&path, &header()).unwrap_err().to_string().contains("exists already"));
 
         let text = std::fs::read(&path).unwrap();
         std::fs::write(&path, &text[..text.len() - 9]).unwrap();
@@ -449,7 +430,7 @@ mod tests {
         drop(writer);
         assert_eq!(ScanLog::read(&path).unwrap().rows, [row(0), row(1), row(7)]);
         let other = LogHeader { scene: "name = \"y\"\n".to_owned(), ..header() };
-        assert!(matches!(LogWriter::resume(&path, &other), Err(LogError::OtherScene(_))));
+        assert!(LogWriter::resume(&path, &other).unwrap_err().to_string().contains("another scene"));
         assert!(ScanLog::is_simulated(&path));
         std::fs::write(&path, LogHeader { simulated: false, ..header() }.text()).unwrap();
         assert!(ScanLog::is_one(&path) && !ScanLog::is_simulated(&path));

@@ -17,60 +17,27 @@ mod trajectory;
 
 pub use controller::GRAVITY;
 pub use friction::{add_slip, identify_friction};
-pub use log::{LogError, LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
+pub use log::{LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
 pub use pd_control::{PdControl, PdOutput};
 pub use plan::{Plan, PressRecord, Stop};
 pub use steady::Steadiness;
 pub use trajectory::Trajectory;
 
 use crate::{
-    control::{Clock, ClockError, ControlLoop, Patience, beside},
+    Error,
+    control::{Clock, ControlLoop, Patience, beside},
     dataset::JointLabel,
     device::{Clamps, Device},
+    error,
     proxy::Chain,
     scene::{JointSpec, ScanSpec},
 };
 use controller::{End, Route, ScanController};
 use std::{
     collections::HashSet,
-    io,
+    fmt,
     sync::atomic::{AtomicBool, Ordering},
 };
-
-/// A scan failed or was stopped.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScanError {
-    /// The plan has too many points.
-    #[error("the plan has more than {limit} points: widen its spacing")]
-    TooManyPoints {
-        /// The limit.
-        limit: usize,
-    },
-    /// Not a point of the plan can be reached.
-    #[error("the joints reach no point of the plan: check its start, directions and the joints' limits")]
-    NothingReachable,
-    /// The device failed.
-    #[error("the rig failed: {0}")]
-    Rig(String),
-    /// The device has no clock for the scan.
-    #[error(transparent)]
-    Clock(#[from] ClockError),
-    /// The system gives no thread.
-    #[error("a scan needs a thread for its device: {0}; close other programs")]
-    Thread(#[from] io::Error),
-    /// The log failed.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    /// A limit stopped the scan.
-    #[error("stopped at point {point} for safety: {what}. The point is logged as `limit`; --resume goes on after it")]
-    Limit {
-        /// Number of the point that was approached.
-        point: usize,
-        /// Which limit, and by how much.
-        what: String,
-    },
-}
 
 /// Where the rate of a scan is set.
 pub const RATE: &str = "[scan.control] of the scene";
@@ -148,7 +115,7 @@ impl Session<'_> {
     ///
     /// # Errors
     /// When the device or the log fails, or a limit is exceeded; the log then holds all that was measured.
-    pub fn scan(&mut self, plan: &Plan, logged: &[ScanRow]) -> Result<ScanReport, ScanError> {
+    pub fn scan(&mut self, plan: &Plan, logged: &[ScanRow]) -> Result<ScanReport, Error> {
         let done: HashSet<usize> = logged.iter().map(|row| row.point).collect();
         let stops = pending(plan, &done).into_iter().rev().collect();
         let unreachable = plan.unreachable.len();
@@ -167,7 +134,7 @@ impl Session<'_> {
     ///
     /// # Errors
     /// When the device or the log fails, or a limit is exceeded; the log then holds all that was measured.
-    pub fn guided(&mut self, seconds: f64, logged: &[ScanRow]) -> Result<ScanReport, ScanError> {
+    pub fn guided(&mut self, seconds: f64, logged: &[ScanRow]) -> Result<ScanReport, Error> {
         let next = logged.iter().map(|row| row.point + 1).max().unwrap_or(0);
         let mut report = self.run((Route::Guided(seconds), next), ScanReport::default(), logged)?;
         (report.points, report.whole) = (report.logged(), true);
@@ -175,12 +142,7 @@ impl Session<'_> {
     }
 
     /// Runs the scan and counts its rows in `report`.
-    fn run(
-        &mut self,
-        route: (Route, usize),
-        mut report: ScanReport,
-        logged: &[ScanRow],
-    ) -> Result<ScanReport, ScanError> {
+    fn run(&mut self, route: (Route, usize), mut report: ScanReport, logged: &[ScanRow]) -> Result<ScanReport, Error> {
         (report.rig, report.simulated) = (self.header.rig.clone(), self.header.simulated);
         let mut last_recorded = None;
         let mut count = |report: &mut ScanReport, row: &ScanRow| {
@@ -195,7 +157,7 @@ impl Session<'_> {
         let controller = ScanController::new(spec, chain, route, self.stop);
         let (log, progress) = (&mut *self.log, &mut *self.progress);
         let reachable = report.points - report.unreachable;
-        let mut keep = |row: ScanRow| -> Result<(), LogError> {
+        let mut keep = |row: ScanRow| -> Result<(), Error> {
             log.append(&row)?;
             count(&mut report, &row);
             let done = report.logged();
@@ -221,8 +183,9 @@ impl Session<'_> {
             let send = |scan: &mut ScanController<'_>, row: Option<ScanRow>, _| {
                 row.is_none_or(|row| rows.push(row).is_ok()) && !scan.is_over()
             };
-            stopped = beside("device", measured, || driver.run(clock, send).refused, &mut take)?
-                .map_err(|_| ScanError::Rig("the thread that drives the device ended unexpectedly".into()))?;
+            stopped = beside("device", measured, || driver.run(clock, send).refused, &mut take)
+                .map_err(|why| error!("a scan needs a thread for its device: {why}; close other programs"))?
+                .map_err(|_| rig_failed("the thread that drives the device ended unexpectedly"))?;
         } else {
             driver.run(clock, |scan, row, _| {
                 let is_measured = row.as_ref().is_some_and(|row| !row.status.is_recorded());
@@ -238,21 +201,31 @@ impl Session<'_> {
         match controller.end() {
             None if controller.is_over() || !against_time => Ok(report),
             None if stop.load(Ordering::Relaxed) => {
-                Err(ScanError::Rig("interrupted; --resume goes on after the last point in the log".into()))
+                Err(rig_failed("interrupted; --resume goes on after the last point in the log"))
             }
-            None => Err(ScanError::Rig(stopped.pop().unwrap_or_else(|| "the log takes too long to write".into()))),
-            Some(End::Limit(point, limit)) => Err(ScanError::Limit { point, what: limit.text(spec, chain) }),
-            Some(End::Halt(halt)) => Err(ScanError::Rig(halt.to_string())),
+            None => Err(rig_failed(stopped.pop().unwrap_or_else(|| "the log takes too long to write".into()))),
+            Some(End::Limit(point, limit)) => {
+                let what = limit.text(spec, chain);
+                Err(error!(
+                    "stopped at point {point} for safety: {what}. The point is logged as `limit`; --resume goes on after it"
+                ))
+            }
+            Some(End::Halt(halt)) => Err(rig_failed(halt)),
             Some(End::Reduced(torque, clamps)) => {
                 let is_warm = clamps.contains(Clamps::WARM);
                 let why = if is_warm { "its motors are warm" } else { "it is beyond the device's limit" };
-                Err(ScanError::Rig(format!(
+                Err(rig_failed(format_args!(
                     "the device cannot hold {torque:.3?} (N m or N, joint by joint), {why}: what it would measure is \
                      not the contact's torque; press less deep or lower the gains of [scan.control]"
                 )))
             }
         }
     }
+}
+
+/// The error of a device that failed.
+fn rig_failed(why: impl fmt::Display) -> Error {
+    error!("the rig failed: {why}")
 }
 
 /// Stops whose point is not done; way points only where they lead to or from one.

@@ -7,10 +7,9 @@
 //! After some of the lines come presses that are recorded ([`crate::scene::HistorySpec`]): in to the line's last level but one, held, aside and back
 //! along both axes across, and out again.
 
-use super::ScanError;
 use crate::proxy::inverse_kinematics::reach;
 use crate::{
-    JointVector,
+    Error, JointVector, error,
     proxy::Chain,
     scene::{PlanSpec, ScanSpec, WorkspacePlan},
 };
@@ -24,6 +23,10 @@ const SCAN_POINTS: usize = 1_000_000;
 
 /// The golden ratio less one, whose multiples spread evenly however many follow.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// What is wrong with a plan of which nothing can be reached.
+const NOTHING_REACHABLE: &str =
+    "the joints reach no point of the plan: check its start, directions and the joints' limits";
 
 /// One stop of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +67,7 @@ impl Plan {
     ///
     /// # Errors
     /// When it has too many points, or the joints reach none of them.
-    pub fn new(spec: &ScanSpec, chain: &Chain) -> Result<Self, ScanError> {
+    pub fn new(spec: &ScanSpec, chain: &Chain) -> Result<Self, Error> {
         let plan = match &spec.plan {
             PlanSpec::Workspace(plan) => workspace(plan, spec, chain)?,
             PlanSpec::Joints(grid) => {
@@ -84,7 +87,7 @@ impl Plan {
             }
         };
         if plan.stops.is_empty() {
-            return Err(ScanError::NothingReachable);
+            return Err(NOTHING_REACHABLE.into());
         }
         Ok(plan)
     }
@@ -108,9 +111,11 @@ impl Plan {
     }
 }
 
-fn checked_points(counts: &[usize]) -> Result<usize, ScanError> {
+fn checked_points(counts: &[usize]) -> Result<usize, Error> {
     let points = counts.iter().try_fold(1_usize, |product, &count| product.checked_mul(count));
-    points.filter(|&points| points <= SCAN_POINTS).ok_or(ScanError::TooManyPoints { limit: SCAN_POINTS })
+    points
+        .filter(|&points| points <= SCAN_POINTS)
+        .ok_or_else(|| error!("the plan has more than {SCAN_POINTS} points: widen its spacing"))
 }
 
 /// Places of a grid with the last axis fastest, every other row backwards, each with its number in plain order.
@@ -133,7 +138,7 @@ fn serpentine(counts: &[usize]) -> impl Iterator<Item = (usize, Vec<usize>)> {
     })
 }
 
-fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Plan, ScanError> {
+fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Plan, Error> {
     let node = spec.plan.node(chain.nodes.len());
     let counts = [plan.across[0].count, plan.across[1].count];
     let depth = plan.depth;
@@ -193,7 +198,7 @@ fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Pla
         }
     }
     if result.unreachable.len() == points {
-        return Err(ScanError::NothingReachable);
+        return Err(NOTHING_REACHABLE.into());
     }
     Ok(result)
 }

@@ -6,8 +6,15 @@ use super::{ProxySpec, SceneError};
 use clap::ValueEnum;
 use serde::de::{Deserialize, Deserializer, Error, IgnoredAny};
 
-/// What [`ContactLaw::Rest`] took the place of; datasets of it are still read.
-const LINEARISED: &str = "linearised";
+/// Names that are those of no law any more, and what to do about it; datasets of them are still felt.
+const FORMER_LAWS: [(&str, &str); 2] = [
+    (
+        "linearised",
+        "the law \"linearised\" is no more, its torque was not the gradient of its energy: take law = \"rest\", or leave \
+         it out",
+    ),
+    ("paper", "the paper's iteration is no law of a scene, `haptize paper` alone solves by it: leave law out"),
+];
 
 /// Keys that name the law of contact: the last two in former scenes.
 pub(super) const LAW_KEYS: [&str; 3] = ["law", "geometry", "algorithm"];
@@ -40,9 +47,9 @@ pub(super) struct ContactTable {
     stiffness: f64,
     #[serde(default, deserialize_with = "positive")]
     stiffness_per_length: Option<f64>,
-    /// `None` where it is one that is no more. Former scenes named it by `geometry` or `algorithm`.
+    /// What to do where it is one that is no more. Former scenes named it by `geometry` or `algorithm`.
     #[serde(default = "default_law", deserialize_with = "law", alias = "geometry", alias = "algorithm")]
-    pub law: Option<ContactLaw>,
+    law: Result<ContactLaw, &'static str>,
     #[serde(default = "tolerance", deserialize_with = "share")]
     tolerance: f64,
     #[serde(default = "max_iterations", deserialize_with = "at_least_one")]
@@ -65,12 +72,6 @@ pub enum ContactSurface {
 }
 
 impl ContactSpec {
-    /// The surface that the law feels: the paper's iteration is defined on facets.
-    #[must_use]
-    pub fn felt_surface(&self) -> ContactSurface {
-        if self.law == ContactLaw::Paper { ContactSurface::Facets } else { self.surface }
-    }
-
     /// Returns Kc of a node that stands for `length` of a link (m), in (N/m): with a stiffness per length k' the third
     /// part of k' times the length, so that the contact point's kc = 3 Kc is k' times the length, and the whole link's
     /// does not depend on the number of its nodes.
@@ -99,8 +100,6 @@ pub enum ContactLaw {
     /// Minimum of the stored energy with depths and directions before the deformed surface.
     #[value(alias = "energy")]
     Following,
-    /// The paper's four-step iteration (section 2.1).
-    Paper,
 }
 
 impl ContactLaw {
@@ -110,7 +109,6 @@ impl ContactLaw {
         match self {
             Self::Rest => "rest",
             Self::Following => "following",
-            Self::Paper => "paper",
         }
     }
 }
@@ -131,16 +129,18 @@ fn at_least_one<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
     }
 }
 
-fn default_law() -> Option<ContactLaw> {
-    Some(ContactLaw::default())
+fn default_law() -> Result<ContactLaw, &'static str> {
+    Ok(ContactLaw::default())
 }
 
-/// Reads the law of contact, by its name; `None` for [`LINEARISED`].
-fn law<'de, D: Deserializer<'de>>(value: D) -> Result<Option<ContactLaw>, D::Error> {
+/// Reads the law of contact, by its name; the remedy for one of [`FORMER_LAWS`].
+fn law<'de, D: Deserializer<'de>>(value: D) -> Result<Result<ContactLaw, &'static str>, D::Error> {
     let name = String::deserialize(value)?;
-    let found = ContactLaw::from_str(&name, false).ok();
-    if found.is_some() || name == LINEARISED {
-        return Ok(found);
+    if let Ok(law) = ContactLaw::from_str(&name, false) {
+        return Ok(Ok(law));
+    }
+    if let Some((_, remedy)) = FORMER_LAWS.into_iter().find(|(former, _)| *former == name) {
+        return Ok(Err(remedy));
     }
     let names: Vec<String> = ContactLaw::value_variants().iter().map(|known| format!("`{}`", known.name())).collect();
     Err(D::Error::custom(format!("unknown law of contact {name:?}: take one of {}", names.join(", "))))
@@ -157,15 +157,13 @@ impl ContactTable {
         let nodes = || proxy.joints.iter().flat_map(|joint| &joint.nodes);
         let error = |key: &str, message: &str| Err(checker.at(&format!("contact.{key}"), message));
         if self.updates.is_some() {
-            return error("updates", "updates acted on the law \"linearised\", which is no more: leave it out");
+            return error("updates", "updates applied to the law \"linearised\", which no longer exists: leave it out");
         }
-        let Some(law) = self.law else {
-            let message = "the law \"linearised\" is no more, its torque was not the gradient of its energy: take \
-                           law = \"rest\", or leave it out";
+        let law = self.law.or_else(|remedy| {
             let key = LAW_KEYS.into_iter().find(|key| checker.has(&format!("contact.{key}")));
-            return error(key.unwrap_or("law"), message);
-        };
-        let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, mut surface, .. } = self;
+            Err(checker.at(&format!("contact.{}", key.unwrap_or("law")), remedy))
+        })?;
+        let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, surface, .. } = self;
         match (stiffness > 0.0, stiffness_per_length) {
             (true, None) => {}
             (true, Some(_)) => {
@@ -187,20 +185,10 @@ impl ContactTable {
                 return error("stiffness", message);
             }
         }
-        match (surface, law) {
-            (ContactSurface::Smooth, ContactLaw::Paper) if checker.has("contact.surface") => {
-                let message = "the law \"paper\" is defined on the triangles: leave out surface or law";
-                return error("surface", message);
-            }
-            (ContactSurface::Smooth, ContactLaw::Paper) => surface = ContactSurface::Facets,
-            (ContactSurface::Facets, ContactLaw::Following | ContactLaw::Rest)
-                if nodes().any(|node| node.radius > 0.0) =>
-            {
-                let message = "nodes with a radius do not balance where the closest triangle changes: leave surface \
-                               out, and they touch the smooth surface";
-                return error("surface", message);
-            }
-            _ => {}
+        if surface == ContactSurface::Facets && nodes().any(|node| node.radius > 0.0) {
+            let message = "nodes with a radius do not balance where the closest triangle changes: leave surface out, and \
+                           they touch the smooth surface";
+            return error("surface", message);
         }
         Ok(ContactSpec { stiffness, stiffness_per_length, law, tolerance, max_iterations, surface })
     }

@@ -1,6 +1,6 @@
 //! Errors of the scene file: where, what, and what to do, with the line and a caret under the place.
 
-use crate::names::is_disruptive;
+use crate::{Error, ErrorKind, names::is_disruptive};
 use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -105,6 +105,24 @@ impl fmt::Display for Diagnostic {
 }
 
 impl std::error::Error for Diagnostic {}
+
+impl From<SceneError> for Error {
+    fn from(error: SceneError) -> Self {
+        match error {
+            SceneError::Unreadable { path, reason } => {
+                Self::at(&path, format_args!("cannot read the scene: {reason}")).of(ErrorKind::File)
+            }
+            SceneError::Invalid(diagnostic) => (*diagnostic).into(),
+        }
+    }
+}
+
+impl From<Diagnostic> for Error {
+    fn from(diagnostic: Diagnostic) -> Self {
+        let Diagnostic { path, line, column, .. } = &diagnostic;
+        Self::new(diagnostic.to_string()).in_file(path, Some((*line, *column))).of(ErrorKind::Scene)
+    }
+}
 
 impl From<Diagnostic> for SceneError {
     fn from(diagnostic: Diagnostic) -> Self {

@@ -8,8 +8,7 @@ use super::object::ObjectTable;
 use super::proxy::ProxyTable;
 use super::scan::ScanTable;
 use super::{
-    ContactLaw, DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene,
-    SceneError, shape,
+    DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene, SceneError, shape,
 };
 use crate::names;
 use serde::Deserialize;
@@ -90,10 +89,9 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
     };
     graphics.map_or(Ok(()), |graphics| graphics.check(checker, object.as_ref()))?;
     let mut haptics = take(&mut table.haptics);
-    // What a solved dataset holds is the gradient of an energy, but for the paper's iteration; a measured one has an
-    // energy where it was learnt how the object relaxes.
-    let solved = table.contact.as_ref().is_some_and(|contact| contact.law != Some(ContactLaw::Paper));
-    if !(checker.has("haptics.interpolation") || is_measured || object.is_some() && solved) {
+    // What a solved dataset holds is the gradient of an energy; a measured one has an energy where it was learnt how the
+    // object relaxes.
+    if !(checker.has("haptics.interpolation") || is_measured || object.is_some() && table.contact.is_some()) {
         haptics.interpolation = Interpolation::Linear;
     }
     if relaxation.is_some() && !haptics.interpolation.is_potential() {

@@ -6,6 +6,7 @@
 mod check;
 mod contact;
 mod device;
+mod edit;
 mod effects;
 mod effort;
 mod error;
@@ -28,6 +29,7 @@ mod value;
 
 pub use contact::{ContactLaw, ContactSpec, ContactSurface};
 pub use device::DeviceSpec;
+pub use edit::SceneText;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
 pub use error::{Diagnostic, SceneError};
@@ -41,8 +43,8 @@ pub use haptics::{
 };
 pub use motion::{MotionSpec, Waypoint};
 pub use object::{
-    ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape,
-    SpringKind, SpringSpec,
+    ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec,
+    Placement, Shape, SpringKind, SpringSpec,
 };
 pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 pub use relaxation::{MOST_TERMS, RelaxationSpec};
@@ -145,10 +147,16 @@ impl Scene {
         Ok(scene)
     }
 
+    /// Whether `path` names a scene rather than a dataset: by its ending, `.toml`.
+    #[must_use]
+    pub fn is_at(path: &Path) -> bool {
+        path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+    }
+
     /// Whether the loop interpolates torque with its tangent d tau/d q, so that each equilibrium is to come with it.
     #[must_use]
     pub fn uses_tangent(&self) -> bool {
-        self.haptics.interpolation.is_potential() && self.contact.law != ContactLaw::Paper
+        self.haptics.interpolation.is_potential()
     }
 
     /// Validates the text of a scene. `path` is where it came from: messages name it, and relative paths in the scene
@@ -169,7 +177,7 @@ impl Scene {
         let mut scene = Self::parse(text, &path)?;
         scene.contact.law = ContactLaw::from_str(law, true).map_err(|_| {
             let message =
-                format!("it was solved by the law `{}`, which is no more: bake it anew", crate::names::escaped(law));
+                format!("it was solved by `{}`, which is no law of a scene: bake it anew", crate::names::escaped(law));
             Checker { path: path.as_ref(), text }.at("contact", message)
         })?;
         Ok(scene)

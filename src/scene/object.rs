@@ -2,7 +2,7 @@
 
 use super::check::Checker;
 use super::skin::{SkinSpec, SkinTable};
-use super::value::{KEY, Range, count, defaults, finite, not_negative, positive, vector};
+use super::value::{KEY, Range, count, defaults, finite, not_negative, positive, rotation, vector};
 use super::{RelaxationSpec, SceneError};
 use glam::DVec3;
 use serde::de::{Deserialize, Deserializer, Error};
@@ -59,15 +59,12 @@ pub enum Shape {
         /// Parts n of each edge of the icosahedron: 10 n^2 + 2 nodes.
         divisions: usize,
     },
-    /// A closed triangle mesh: OBJ, STL or PLY by the file's extension. `scale` multiplies its coordinates (0.001 for
-    /// millimetres), `centre` is then added (m).
+    /// A closed triangle mesh: OBJ, STL or PLY by the file's extension.
     Mesh {
         /// Relative to the scene file's folder when the scene names it so; ready to open here.
         file: PathBuf,
-        /// (1)
-        scale: f64,
-        /// (m)
-        centre: DVec3,
+        /// Where its coordinates lie in space.
+        placement: Placement,
         /// Mean edge to which the surface is refined, where it is (m).
         refine: Option<f64>,
     },
@@ -75,11 +72,44 @@ pub enum Shape {
     Tetrahedra {
         /// See `Mesh`.
         file: PathBuf,
-        /// (1)
-        scale: f64,
-        /// (m)
-        centre: DVec3,
+        /// See `Mesh`.
+        placement: Placement,
     },
+}
+
+impl Shape {
+    /// The point that is moved to move the object: the centre of a sphere, the origin of a file's coordinates (m).
+    #[must_use]
+    pub fn centre(&self) -> DVec3 {
+        match self {
+            Self::Sphere { centre, .. } | Self::Icosphere { centre, .. } => *centre,
+            Self::Mesh { placement, .. } | Self::Tetrahedra { placement, .. } => placement.centre,
+        }
+    }
+}
+
+/// Where a file's coordinates lie in space: they are scaled, then turned, then moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Factor on the coordinates: 0.001 for millimetres (m).
+    pub scale: f64,
+    /// Angles about x, then y, then z (rad).
+    pub turn: DVec3,
+    /// Where the origin comes to lie (m).
+    pub centre: DVec3,
+}
+
+impl Placement {
+    /// Coordinates in metres, where they lie.
+    pub const METRES: Self = Self { scale: 1.0, turn: DVec3::ZERO, centre: DVec3::ZERO };
+
+    /// Returns `nodes` in space (m).
+    #[must_use]
+    pub fn place(&self, mut nodes: Vec<DVec3>) -> Vec<DVec3> {
+        let turned = rotation(self.turn);
+        nodes.iter_mut().for_each(|node| *node = turned * (self.scale * *node) + self.centre);
+        nodes
+    }
 }
 
 /// Material that resists deformation.
@@ -262,6 +292,8 @@ struct MeshTable {
     #[serde(default = "scale", deserialize_with = "positive")]
     scale: f64,
     #[serde(default, deserialize_with = "vector")]
+    turn: DVec3,
+    #[serde(default, deserialize_with = "vector")]
     centre: DVec3,
     #[serde(default, deserialize_with = "positive")]
     refine: Option<f64>,
@@ -351,15 +383,15 @@ impl ObjectTable {
         let is_solid = tetrahedra.is_some();
         let shape = match (sphere, mesh, tetrahedra) {
             (Some(sphere), None, None) => sphere.check(checker)?,
-            (None, Some(MeshTable { file, scale, centre, refine }), None) => {
-                Shape::Mesh { file: folder.join(file), scale, centre, refine }
+            (None, Some(MeshTable { file, scale, turn, centre, refine }), None) => {
+                Shape::Mesh { file: folder.join(file), placement: Placement { scale, turn, centre }, refine }
             }
             (None, None, Some(MeshTable { refine: Some(_), .. })) => {
                 let message = "tetrahedra are not refined: mesh the solid finer";
                 return Err(checker.at("object.tetrahedra.refine", message));
             }
-            (None, None, Some(MeshTable { file, scale, centre, .. })) => {
-                Shape::Tetrahedra { file: folder.join(file), scale, centre }
+            (None, None, Some(MeshTable { file, scale, turn, centre, .. })) => {
+                Shape::Tetrahedra { file: folder.join(file), placement: Placement { scale, turn, centre } }
             }
             (None, None, None) => {
                 let message = "the object has no shape: add [object.sphere], [object.mesh] or [object.tetrahedra]";
@@ -486,5 +518,20 @@ impl GroundTable {
             }
         };
         Ok(GroundSpec { stiffness, nodes })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn coordinates_are_scaled_then_turned_about_x_y_and_z_then_moved() {
+        let placement = Placement { scale: 2.0, turn: DVec3::new(FRAC_PI_2, 0.0, FRAC_PI_2), centre: DVec3::X };
+        let placed = placement.place(vec![DVec3::X, DVec3::Y, DVec3::Z]);
+        // About x, y goes to z and z to -y; then about z, x goes to y and -y to x.
+        let expected = [DVec3::new(1.0, 2.0, 0.0), DVec3::new(1.0, 0.0, 2.0), DVec3::new(3.0, 0.0, 0.0)];
+        placed.iter().zip(expected).for_each(|(x, expected)| assert!(x.distance(expected) < 1e-12, "{placed:?}"));
     }
 }

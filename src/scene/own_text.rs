@@ -53,7 +53,6 @@ mod tests {
         scene.grid.axes[2].count = 13;
         scene.contact.tolerance = 3e-5;
         scene.haptics.interpolation = Interpolation::Potential;
-        // Paper's iteration feels the triangles.
         for law in [ContactLaw::Rest, ContactLaw::Following] {
             scene.contact.law = law;
             assert_eq!(scene.with_own_text().unwrap().contact, scene.contact);

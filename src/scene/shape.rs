@@ -1,10 +1,10 @@
 //! Shapes of links: drawn, not felt. Nothing that is solved depends on them.
 
 use super::check::Checker;
-use super::value::{edges, positive, vector};
+use super::value::{edges, positive, rotation, vector};
 use super::{JointSpec, SceneError};
 use base64::{Engine, engine::general_purpose::STANDARD};
-use glam::{DAffine3, DQuat, DVec3, EulerRot};
+use glam::{DAffine3, DVec3};
 
 /// Most shapes of an arm.
 pub const MAX_SHAPES: usize = 512;
@@ -190,7 +190,7 @@ impl ShapeTable {
                 return Err(checker.at(path, message));
             }
         };
-        let rotation = DQuat::from_euler(EulerRot::ZYX, self.turn.z, self.turn.y, self.turn.x);
+        let rotation = rotation(self.turn);
         Ok(LinkShape { joint, place: DAffine3::from_rotation_translation(rotation, self.at), form })
     }
 }

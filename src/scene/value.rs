@@ -2,7 +2,7 @@
 //! and the reader of the file adds the place.
 
 use crate::{JointVector, MAX_JOINTS};
-use glam::DVec3;
+use glam::{DQuat, DVec3, EulerRot};
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Unexpected, Visitor};
 use std::fmt;
@@ -18,6 +18,11 @@ macro_rules! defaults {
 }
 
 pub(super) use defaults;
+
+/// The rotation by angles about x, then y, then z (rad).
+pub(super) fn rotation(turn: DVec3) -> DQuat {
+    DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x)
+}
 
 /// Largest size of any number: far beyond every physical quantity in SI units that a scene may hold, and its powers
 /// that the engine forms are still finite.

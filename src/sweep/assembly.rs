@@ -5,6 +5,7 @@ use super::{
     columns::Shape,
     table::{Block, Table},
 };
+use crate::Error;
 use crate::dataset::{
     self, Heading, RESULTS, Stored, Surface, Target, Tensor, TensorContents, surface_tensors, write_file,
 };
@@ -91,7 +92,7 @@ impl<'a> Results<'a> {
     }
 
     /// Writes all points as the dataset `output`.
-    pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), dataset::Error> {
+    pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), Error> {
         let tensor =
             |array: Stored| Tensor::stored(array, heading.grid, self.bytes(array), Contents::Results(self, array));
         let stored = RESULTS.into_iter().filter(|array| self.shape.has(*array));

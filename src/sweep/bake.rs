@@ -1,12 +1,13 @@
 //! From a scene to its dataset: object and proxy are built, a backend is chosen, and the grid is swept.
 
-use super::{BackendChoice, BackendError, ChosenBackend, Progress, Run, Shard, Sweep, SweepError, SweepReport};
+use super::{BackendChoice, ChosenBackend, Progress, Run, Shard, Sweep, SweepReport};
 use crate::{
-    JointVector,
+    Error, ErrorKind, JointVector, MAX_AXES,
     contact::Model,
     dataset::Dataset,
-    object::{Compliance, LatticeError, Object, ObjectError},
+    object::{Compliance, LatticeError, Object},
     proxy::Chain,
+    random::Random,
     scene::{AxisSpec, Scene},
 };
 use std::{
@@ -14,22 +15,11 @@ use std::{
     sync::atomic::AtomicBool,
 };
 
-/// The object of a scene cannot be built.
-#[derive(Debug, thiserror::Error)]
-#[error("{}:{line}: {source}", .path.display())]
-pub struct SceneObjectError {
-    /// The scene's file.
-    path: PathBuf,
-    /// Line of the object in it, from one.
-    line: usize,
-    source: ObjectError,
-}
-
 /// Builds the object of `scene`, where there is memory to solve contact with it.
 ///
 /// # Errors
 /// Where it is refused, with its line in the scene.
-pub fn build_object(scene: &Scene) -> Result<Object, SceneObjectError> {
+pub fn build_object(scene: &Scene) -> Result<Object, Error> {
     let object = Object::build(&scene.object).and_then(|object| {
         // Of a larger surface only a part of the compliance is formed, and its size is checked when it is known.
         if object.surface_nodes <= Model::WHOLE {
@@ -39,26 +29,8 @@ pub fn build_object(scene: &Scene) -> Result<Object, SceneObjectError> {
     });
     object.map_err(|source| {
         let line = scene.text.lines().position(|line| line.trim_start_matches([' ', '[']).starts_with("object"));
-        SceneObjectError { path: scene.path.clone(), line: line.map_or(1, |line| line + 1), source }
+        Error::on_line(&scene.path, line.map_or(1, |line| line + 1) as u64, source).of(ErrorKind::Scene)
     })
-}
-
-/// A scene could not be haptized.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BakeError {
-    /// The scene's object is refused.
-    #[error(transparent)]
-    Scene(#[from] SceneObjectError),
-    /// The object is too large for contact.
-    #[error(transparent)]
-    Object(#[from] ObjectError),
-    /// No backend.
-    #[error(transparent)]
-    Backend(#[from] BackendError),
-    /// The sweep failed or was stopped.
-    #[error(transparent)]
-    Sweep(#[from] SweepError),
 }
 
 /// How a scene is haptized.
@@ -83,8 +55,8 @@ pub struct Bake<'a> {
 /// Haptizes `scene` in memory on the CPU; its error is not measured, and it bears no date.
 ///
 /// # Errors
-/// Any [`BakeError`].
-pub fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), BakeError> {
+/// As [`Bake::in_memory`].
+pub fn baked(scene: &Scene) -> Result<(Dataset, SweepReport), Error> {
     let (backend, stop) = (BackendChoice::Cpu, AtomicBool::new(false));
     let bake = Bake { scene, backend, measured: Some(0), aim: None, date: "", stop: &stop, progress: &mut |_| () };
     bake.in_memory()
@@ -95,49 +67,49 @@ impl Bake<'_> {
     /// [`Sweep::bake`].
     ///
     /// # Errors
-    /// Any [`BakeError`].
-    pub fn to_file(self, output: &Path, resume: bool) -> Result<SweepReport, BakeError> {
+    /// When the object or the grid is refused, no backend opens, or the sweep fails or is stopped.
+    pub fn to_file(self, output: &Path, resume: bool) -> Result<SweepReport, Error> {
         self.with(|sweep, backend, run| sweep.bake(backend, output, resume, run))
     }
 
     /// Haptizes in memory.
     ///
     /// # Errors
-    /// Any [`BakeError`].
-    pub fn in_memory(self) -> Result<(Dataset, SweepReport), BakeError> {
+    /// When the object or the grid is refused, no backend opens, or the sweep fails or is stopped.
+    pub fn in_memory(self) -> Result<(Dataset, SweepReport), Error> {
         self.with(|sweep, backend, run| sweep.run(backend, run))
     }
 
     /// Solves one shard into a file in `folder`; see [`Sweep::bake_shard`].
     ///
     /// # Errors
-    /// Any [`BakeError`].
-    pub fn to_shard(self, folder: &Path, shard: Shard) -> Result<(PathBuf, Option<SweepReport>), BakeError> {
+    /// When the object or the grid is refused, no backend opens, or the sweep fails or is stopped.
+    pub fn to_shard(self, folder: &Path, shard: Shard) -> Result<(PathBuf, Option<SweepReport>), Error> {
         self.prepared(|sweep, backend, run| {
             // What was sampled is the whole grid.
             sweep.forecast = None;
-            Ok(sweep.bake_shard(backend, folder, shard, run)?)
+            sweep.bake_shard(backend, folder, shard, run)
         })
     }
 
     fn with<T>(
         self,
-        sweep_with: impl FnOnce(&Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, SweepError>,
-    ) -> Result<T, BakeError> {
+        sweep_with: impl FnOnce(&Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         self.prepared(|sweep, backend, run| {
             if sweep.forecast.is_none() {
                 let is_timed = matches!(backend, ChosenBackend::Cpu(_));
                 sweep.predict(backend, is_timed)?;
             }
-            Ok(sweep_with(sweep, backend, run)?)
+            sweep_with(sweep, backend, run)
         })
     }
 
     /// Builds all that a sweep needs, and does `work` with it.
     pub(super) fn prepared<T>(
         self,
-        work: impl FnOnce(&mut Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, BakeError>,
-    ) -> Result<T, BakeError> {
+        work: impl FnOnce(&mut Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         let Self { scene, backend, measured, aim, date, stop, progress } = self;
         let object = build_object(scene)?;
         let chain = Chain::new(&scene.proxy);
@@ -163,7 +135,7 @@ impl Bake<'_> {
 }
 
 /// The model by which the grid of `scene` is solved.
-pub(crate) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, ObjectError> {
+pub(crate) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, Error> {
     let mut model = Model::reaching(object, chain, scene.contact, &sample(scene))?;
     model.with_tangent = scene.uses_tangent();
     model.with_slip = scene.haptics.uses_slip();
@@ -178,7 +150,7 @@ pub(crate) fn sweep_of<'a>(
     model: &'a Model<'a>,
     solved: [&str; 3],
     measured: Option<usize>,
-) -> Result<Sweep<'a>, SweepError> {
+) -> Result<Sweep<'a>, Error> {
     let mut sweep = Sweep::new(scene, object, solved[0], solved[1], solved[2])?;
     sweep.diagnose(model);
     sweep.skip_free_space(model)?;
@@ -192,10 +164,18 @@ pub(crate) fn sweep_of<'a>(
 const SAMPLES: usize = 1 << 16;
 
 /// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it
-/// leaves the grid out: what [`Model::reaching`] looks at.
+/// leaves the grid out, at random where the arm has more joints than a grid has axes: what [`Model::reaching`] looks at.
 #[must_use]
 pub fn sample(scene: &Scene) -> Vec<JointVector> {
     let joints = &scene.proxy.joints;
+    if joints.len() > MAX_AXES {
+        let mut random = Random::new(1);
+        let mut draw = || {
+            let drawn = joints.iter().map(|joint| random.between(joint.limits[0], joint.limits[1]));
+            JointVector::from_slice(&drawn.collect::<Vec<_>>())
+        };
+        return (0..SAMPLES).map(|_| draw()).collect();
+    }
     let count = (SAMPLES as f64).powf(1.0 / joints.len().max(1) as f64) as usize;
     let limits =
         |[least, greatest]: [f64; 2]| AxisSpec { start: least, step: (greatest - least) / (count - 1) as f64, count };

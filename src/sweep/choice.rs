@@ -2,8 +2,9 @@
 
 use super::{Backend, CpuBackend, WithFallback};
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Equilibrium, Model, Work},
+    error,
     gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver, asked_for, named_adapters},
     memory,
     scene::ContactLaw,
@@ -51,21 +52,6 @@ pub enum ChosenBackend<'a> {
     },
 }
 
-/// No backend could be opened.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BackendError {
-    /// The system gives no threads.
-    #[error("no threads to solve on: {0}; close other programs or raise the limit on processes (ulimit -u)")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// There is no memory for the threads.
-    #[error("no memory for threads to solve on: {0}")]
-    Memory(#[from] memory::Shortage),
-    /// There is no adapter, or it cannot take the scene.
-    #[error("{}{}", .0, memory::scarcity())]
-    Gpu(#[from] GpuError),
-}
-
 /// Memory of a thread (bytes): the 2 MiB of its stack, and half as much for what the system and Rust add at its start,
 /// which ends the process where it does not fit.
 const THREAD_MEMORY: usize = 3 << 20;
@@ -75,7 +61,7 @@ impl<'a> ChosenBackend<'a> {
     ///
     /// # Errors
     /// When there is none such, or it cannot be opened.
-    pub fn open(choice: BackendChoice, model: &'a Model<'a>) -> Result<Self, BackendError> {
+    pub fn open(choice: BackendChoice, model: &'a Model<'a>) -> Result<Self, Error> {
         match choice {
             BackendChoice::Cpu => Self::cpu(model),
             // No GPU takes it, so that none needs to be opened.
@@ -90,9 +76,10 @@ impl<'a> ChosenBackend<'a> {
         }
     }
 
-    fn cpu(model: &'a Model<'a>) -> Result<Self, BackendError> {
+    fn cpu(model: &'a Model<'a>) -> Result<Self, Error> {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        memory::check(threads * THREAD_MEMORY)?;
+        memory::check(threads * THREAD_MEMORY)
+            .map_err(|shortage| error!("no memory for threads to solve on: {shortage}"))?;
         Ok(Self::Cpu(CpuBackend::new(model, 0)?))
     }
 
@@ -165,7 +152,7 @@ fn counted(names: impl Iterator<Item = String>) -> String {
 }
 
 impl Backend for ChosenBackend<'_> {
-    type Error = BackendError;
+    type Error = Error;
 
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error> {
         match self {
@@ -185,6 +172,13 @@ impl Backend for ChosenBackend<'_> {
         match self {
             Self::Cpu(cpu) => cpu.notices(),
             Self::Gpu { solver, .. } => solver.notices(),
+        }
+    }
+
+    fn threads(&self) -> usize {
+        match self {
+            Self::Cpu(cpu) => cpu.threads(),
+            Self::Gpu { solver, .. } => solver.threads(),
         }
     }
 

@@ -2,13 +2,20 @@
 //! are kept, by a thread of its own: checksums and the file wait for no solver, and no solver for them.
 
 use super::{
-    Backend, Footprint, FreeSpace, Progress, Run, Sweep, SweepError, columns::Columns, free_space::FreeGaps,
-    part::Part, report::RunFacts, table::Block, tally::Tally,
+    Backend, Footprint, FreeSpace, Progress, Run, Sweep,
+    columns::Columns,
+    error::{miscounted, no_memory, stopped},
+    free_space::FreeGaps,
+    part::Part,
+    report::RunFacts,
+    table::Block,
+    tally::Tally,
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Equilibrium, SHARE, Work},
     dataset::Provenance,
+    error,
 };
 use std::{
     collections::VecDeque,
@@ -33,18 +40,18 @@ pub(super) const BEHIND: usize = 2;
 /// Where a sweep's results go as they come.
 pub(super) trait Store: Send {
     /// Adds a chunk whose first point has number `first`, and leaves columns for another.
-    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), SweepError>;
+    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), Error>;
     /// Adds something that provenance will tell.
-    fn note(&mut self, notice: &str) -> Result<(), SweepError>;
+    fn note(&mut self, notice: &str) -> Result<(), Error>;
     /// Returns where an interrupted sweep continues from.
     fn path(&self) -> Option<&Path>;
 }
 
 impl Store for Part {
-    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), SweepError> {
+    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), Error> {
         Part::append(self, &Block::of(chunk, first))
     }
-    fn note(&mut self, notice: &str) -> Result<(), SweepError> {
+    fn note(&mut self, notice: &str) -> Result<(), Error> {
         Part::note(self, notice)
     }
     fn path(&self) -> Option<&Path> {
@@ -54,11 +61,11 @@ impl Store for Part {
 
 /// In memory: chunks by the number of their first point.
 impl Store for Vec<(usize, Columns)> {
-    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), SweepError> {
+    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), Error> {
         self.push((first, std::mem::take(chunk)));
         Ok(())
     }
-    fn note(&mut self, _notice: &str) -> Result<(), SweepError> {
+    fn note(&mut self, _notice: &str) -> Result<(), Error> {
         Ok(())
     }
     fn path(&self) -> Option<&Path> {
@@ -76,7 +83,7 @@ enum Entry {
 
 /// Hands `entries` to `store` until there are no more, or it fails; columns that are kept are given back as `room` for
 /// others.
-fn keep(store: &mut dyn Store, entries: Receiver<Entry>, room: SyncSender<Columns>) -> Result<(), SweepError> {
+fn keep(store: &mut dyn Store, entries: Receiver<Entry>, room: SyncSender<Columns>) -> Result<(), Error> {
     entries.into_iter().try_for_each(|entry| match entry {
         Entry::Chunk(first, mut columns) => {
             store.append(first, &mut columns)?;
@@ -141,9 +148,9 @@ struct ChunkSize {
 }
 
 impl ChunkSize {
-    /// Begins with the least, since nothing is known of the time yet. At most `most`.
-    fn new(most: usize) -> Self {
-        let least = most.min(SHARE * rayon::current_num_threads());
+    /// Begins with the least for `threads` threads, since nothing is known of the time yet. At most `most`.
+    fn new(most: usize, threads: usize) -> Self {
+        let least = most.min(SHARE * threads);
         Self { size: least, least, most }
     }
 
@@ -185,13 +192,18 @@ impl Sweep<'_> {
         begun: Begun,
         footprint: Footprint,
         store: &mut dyn Store,
-    ) -> Result<Solved, SweepError> {
+    ) -> Result<Solved, Error> {
         let part = store.path().map(Path::to_path_buf);
         let ((entries, to_keep), (back, room)) = (sync_channel(1 + BEHIND), sync_channel(1 + BEHIND));
         let kept = Kept { entries, room, columns: 0 };
         thread::scope(|scope| {
             let keeper = thread::Builder::new().name("keeper".into());
-            let keeper = keeper.spawn_scoped(scope, move || keep(store, to_keep, back)).map_err(SweepError::Threads)?;
+            let keeper = keeper.spawn_scoped(scope, move || keep(store, to_keep, back)).map_err(|why| {
+                error!(
+                    "no thread can be had that keeps the results: {why}; close other programs, or raise the limits on \
+                     processes and memory (ulimit -u, ulimit -v)"
+                )
+            })?;
             let solved = self.solve_chunks(backend, run, begun, footprint, part, kept);
             // What a store says comes first: a sweep whose store has failed only knows that nobody takes its results.
             keeper.join().unwrap_or_else(|panic| resume_unwind(panic))?;
@@ -208,7 +220,7 @@ impl Sweep<'_> {
         footprint: Footprint,
         part: Option<PathBuf>,
         kept: Kept,
-    ) -> Result<Solved, SweepError> {
+    ) -> Result<Solved, Error> {
         let (start, left_before) = (Instant::now(), backend.left_to_cpu());
         let Begun { tally, provenance } = begun;
         let resumed = tally.points;
@@ -220,7 +232,7 @@ impl Sweep<'_> {
             cut: resumed,
             chunks: VecDeque::new(),
             given: 0,
-            size: ChunkSize::new(run.chunk.clamp(1, self.points().max(1))),
+            size: ChunkSize::new(run.chunk.clamp(1, self.points().max(1)), backend.threads()),
             run,
             tally,
             provenance,
@@ -249,9 +261,9 @@ impl Sweep<'_> {
         Ok(Solved { tally: course.tally, facts, provenance: course.provenance })
     }
 
-    pub(super) fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, SweepError> {
+    pub(super) fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, Error> {
         let (points, bytes) = (slab.len(), 4 * slab.len());
-        free_space.find(slab).map_err(|source| SweepError::Memory { points, bytes, source })
+        free_space.find(slab).map_err(|why| no_memory(points, bytes, why))
     }
 }
 
@@ -283,7 +295,7 @@ struct Course<'c, 'r> {
     /// When the last chunk came back.
     taken: Instant,
     /// Why nothing more is wanted.
-    failure: Option<SweepError>,
+    failure: Option<Error>,
 }
 
 impl Course<'_, '_> {
@@ -301,8 +313,8 @@ impl Course<'_, '_> {
         });
     }
 
-    fn stopped(&self) -> SweepError {
-        SweepError::Stopped { done: self.tally.points, points: self.sweep.points(), part: self.part.clone() }
+    fn stopped(&self) -> Error {
+        stopped(self.tally.points, self.sweep.points(), self.part.as_deref())
     }
 
     /// The points that are left to cut off, as far as they are consecutive.
@@ -311,7 +323,7 @@ impl Course<'_, '_> {
     }
 
     /// Looks for free space about the next point, if that was not done.
-    fn look_for_free_space(&mut self) -> Result<(), SweepError> {
+    fn look_for_free_space(&mut self) -> Result<(), Error> {
         let first = self.rest().start;
         if let Some(free_space) = &self.free_space
             && !self.slab.contains(&first)
@@ -349,10 +361,10 @@ impl Course<'_, '_> {
     }
 
     /// Keeps the results of a chunk.
-    fn keep(&mut self, chunk: &Chunk, equilibria: &[Equilibrium]) -> Result<(), SweepError> {
+    fn keep(&mut self, chunk: &Chunk, equilibria: &[Equilibrium]) -> Result<(), Error> {
         let solved = chunk.solved().count();
         if equilibria.len() != solved {
-            return Err(SweepError::Miscount { asked: solved, found: equilibria.len() });
+            return Err(miscounted(solved, equilibria.len()));
         }
         let mut columns = self.kept.columns().ok_or_else(|| self.stopped())?;
         let shape = self.sweep.shape;
@@ -373,19 +385,16 @@ impl Course<'_, '_> {
     }
 
     /// The outcome of the sweep, once the backend is done with it.
-    fn finish<E: std::error::Error + Send + Sync + 'static>(
-        &mut self,
-        streamed: Result<(), E>,
-    ) -> Result<(), SweepError> {
+    fn finish(&mut self, streamed: Result<(), impl std::error::Error>) -> Result<(), Error> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
         let under_way = self.chunks.front().zip(self.chunks.back());
         let (first, last) = under_way
             .map_or((self.cut, self.cut), |(first, last)| (first.points.start, last.points.end.saturating_sub(1)));
-        streamed.map_err(|source| SweepError::Backend { first, last, source: Box::new(source) })?;
+        streamed.map_err(|why| error!("the backend failed at grid points {first} to {last}: {why}"))?;
         if let Some(chunk) = self.chunks.front() {
-            return Err(SweepError::Miscount { asked: chunk.points.len(), found: 0 });
+            return Err(miscounted(chunk.points.len(), 0));
         }
         if self.tally.points < self.sweep.points() { Err(self.stopped()) } else { Ok(()) }
     }
@@ -438,9 +447,11 @@ impl Work for Course<'_, '_> {
 mod tests {
     use super::*;
 
+    const THREADS: usize = 3;
+
     /// After 40 chunks in which a configuration takes `each`: the time of a chunk, and its configurations.
     fn settled(each: Duration) -> (Duration, usize) {
-        let mut size = ChunkSize::new(1 << 14);
+        let mut size = ChunkSize::new(1 << 14, THREADS);
         for _ in 0..40 {
             size.adapt(size.size, each * size.size as u32);
         }
@@ -449,7 +460,7 @@ mod tests {
 
     #[test]
     fn chunks_take_about_a_quarter_of_a_second_however_long_a_configuration_takes() {
-        let least = SHARE * rayon::current_num_threads();
+        let least = SHARE * THREADS;
         assert_eq!(settled(Duration::from_micros(1)).1, 1 << 14);
         for each in [Duration::from_micros(30), Duration::from_micros(200), Duration::from_millis(1)] {
             let (time, size) = settled(each);
@@ -457,9 +468,9 @@ mod tests {
         }
         assert_eq!(settled(Duration::from_secs(9)).1, least);
         // A chunk that skips free points is no reason for a larger one.
-        let mut size = ChunkSize::new(1 << 14);
+        let mut size = ChunkSize::new(1 << 14, THREADS);
         size.adapt(1, Duration::ZERO);
         assert_eq!(size.size, least);
-        assert_eq!(ChunkSize::new(3).size, 3);
+        assert_eq!(ChunkSize::new(3, THREADS).size, 3);
     }
 }

@@ -1,7 +1,8 @@
 //! How near the arm comes to an object that it touches at no point of a grid, and where: what to move, and how far.
 
-use super::{BakeError, build_object};
+use super::build_object;
 use crate::{
+    Error,
     contact::{Model, NearestNode, Proximity},
     dataset::Dataset,
     object::Object,
@@ -32,7 +33,7 @@ impl Clearance {
     ///
     /// # Errors
     /// When the object of the dataset cannot be built.
-    pub fn of(dataset: &Dataset) -> Result<Option<Self>, BakeError> {
+    pub fn of(dataset: &Dataset) -> Result<Option<Self>, Error> {
         let (Some(gaps), Some(surface)) = (&dataset.gap, &dataset.surface) else { return Ok(None) };
         if (0..dataset.grid.points()).any(|point| dataset.status(point).is_in_contact()) {
             return Ok(None);
@@ -59,7 +60,7 @@ impl Clearance {
     ///
     /// # Errors
     /// When the object cannot be built.
-    pub fn at(scene: &Scene, q: &[f64]) -> Result<Option<Self>, BakeError> {
+    pub fn at(scene: &Scene, q: &[f64]) -> Result<Option<Self>, Error> {
         Self::measure(scene, &build_object(scene)?, |_| Some(q.to_vec()))
     }
 
@@ -68,7 +69,7 @@ impl Clearance {
         scene: &Scene,
         object: &Object,
         choose: impl FnOnce(&mut Proximity<'_>) -> Option<Vec<f64>>,
-    ) -> Result<Option<Self>, BakeError> {
+    ) -> Result<Option<Self>, Error> {
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
         let model = Model::reaching(object, &chain, scene.contact, &[])?;

@@ -2,9 +2,10 @@
 
 use super::Backend;
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Equilibrium, Model, SHARE, Solvers, Work},
     dataset::Provenance,
+    error,
     scene::Scene,
 };
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
@@ -38,16 +39,13 @@ impl<'a> CpuBackend<'a> {
     ///
     /// # Errors
     /// When the system gives no threads.
-    pub fn new(model: &'a Model<'a>, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(|k| format!("contact {k}")).build()?;
+    pub fn new(model: &'a Model<'a>, threads: usize) -> Result<Self, Error> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(|k| format!("contact {k}")).build();
+        let pool = pool.map_err(|why| {
+            error!("no threads to solve on: {why}; close other programs or raise the limit on processes (ulimit -u)")
+        })?;
         let solvers = Solvers::new(model, pool.current_num_threads());
         Ok(Self { pool, solvers })
-    }
-
-    /// Number of threads.
-    #[must_use]
-    pub fn threads(&self) -> usize {
-        self.solvers.threads()
     }
 
     /// A good [`super::Run::chunk`] for this backend.
@@ -79,6 +77,10 @@ impl<'a> CpuBackend<'a> {
 
 impl Backend for CpuBackend<'_> {
     type Error = Infallible;
+
+    fn threads(&self) -> usize {
+        self.solvers.threads()
+    }
 
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Infallible> {
         Ok(self.pool.install(|| self.solvers.map(configurations, |solver, q| solver.solve(q))))

@@ -1,10 +1,12 @@
 //! Equilibria solved directly, wherever they are asked for: what a program calls that has no dataset, or wants to check
 //! one.
 
-use super::{BakeError, Inspection, build_object, sample};
+use super::{Inspection, build_object, sample};
 use crate::{
+    Error,
     contact::{Model, Solvers, Status},
-    field::{BatchError, check_rows},
+    error,
+    field::check_rows,
     object::Object,
     proxy::Chain,
     scene::Scene,
@@ -27,23 +29,6 @@ self_cell::self_cell!(
 /// A scene, ready to be solved at any configuration. Threads can share it.
 pub struct Direct(Prepared);
 
-/// A configuration is none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DirectError {
-    /// Not as many coordinates as the proxy has joints.
-    #[error("{found} coordinates were given for a proxy of {joints} joints")]
-    Joints {
-        /// Coordinates given.
-        found: usize,
-        /// Joints of the proxy.
-        joints: usize,
-    },
-    /// A batch of them is none.
-    #[error(transparent)]
-    Batch(#[from] BatchError),
-}
-
 impl Direct {
     /// Builds object and proxy of `scene`. Of an object with more than [`Model::WHOLE`] surface nodes only those are
     /// prepared that the proxy reaches within the scene's grid; a configuration that reaches farther is
@@ -51,7 +36,7 @@ impl Direct {
     ///
     /// # Errors
     /// When the object cannot be built.
-    pub fn new(scene: &Scene) -> Result<Self, BakeError> {
+    pub fn new(scene: &Scene) -> Result<Self, Error> {
         Self::of(scene, build_object(scene)?)
     }
 
@@ -59,7 +44,7 @@ impl Direct {
     ///
     /// # Errors
     /// When its compliance cannot be formed.
-    pub fn of(scene: &Scene, object: Object) -> Result<Self, BakeError> {
+    pub fn of(scene: &Scene, object: Object) -> Result<Self, Error> {
         let parts = Parts { object, chain: Chain::new(&scene.proxy) };
         let prepared = Prepared::try_new(parts, |Parts { object, chain }| {
             Model::reaching(object, chain, scene.contact, &sample(scene))
@@ -83,10 +68,10 @@ impl Direct {
     ///
     /// # Errors
     /// When `q` is no configuration.
-    pub fn inspect(&self, q: &[f64]) -> Result<Inspection, DirectError> {
+    pub fn inspect(&self, q: &[f64]) -> Result<Inspection, Error> {
         let (found, joints) = (q.len(), self.joints());
         if found != joints {
-            return Err(DirectError::Joints { found, joints });
+            return Err(error!("{found} coordinates were given for a proxy of {joints} joints"));
         }
         check_rows(q, joints)?;
         Ok(Inspection::new(self.model(), q))
@@ -97,7 +82,7 @@ impl Direct {
     ///
     /// # Errors
     /// When `configurations` are not whole rows of finite numbers.
-    pub fn torques(&self, configurations: &[f64]) -> Result<(Vec<f64>, Vec<Status>), DirectError> {
+    pub fn torques(&self, configurations: &[f64]) -> Result<(Vec<f64>, Vec<Status>), Error> {
         let joints = self.joints();
         check_rows(configurations, joints)?;
         let rows: Vec<&[f64]> = configurations.chunks_exact(joints).collect();

@@ -7,7 +7,7 @@
 
 use super::{Backend, CpuBackend};
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Equilibrium, Model, Work},
 };
 use std::fmt::Display;
@@ -47,7 +47,7 @@ impl<'a, B: Backend> WithFallback<'a, B> {
         self.notices.push(format!("solved by {}, since {} failed: {error}", CpuBackend::adapter(), self.name));
     }
 
-    fn cpu(&mut self) -> Result<&mut CpuBackend<'a>, rayon::ThreadPoolBuildError> {
+    fn cpu(&mut self) -> Result<&mut CpuBackend<'a>, Error> {
         match &mut self.cpu {
             Some(cpu) => Ok(cpu),
             empty => Ok(empty.insert(CpuBackend::new(self.model, 0)?)),
@@ -57,7 +57,7 @@ impl<'a, B: Backend> WithFallback<'a, B> {
 
 impl<B: Backend> Backend for WithFallback<'_, B> {
     /// When the system gives no threads to the CPU backend.
-    type Error = rayon::ThreadPoolBuildError;
+    type Error = Error;
 
     fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error> {
         if let Some(device) = &mut self.device {

@@ -4,10 +4,11 @@
 //! is cut into chunks, and an interrupted sweep continues where it stopped (see [`Sweep::bake`]).
 
 use super::{
-    Backend, ChosenBackend, Footprint, Forecast, FreeSpace, SweepError, SweepReport,
+    Backend, ChosenBackend, Footprint, Forecast, FreeSpace, SweepReport,
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
     columns::{Columns, Shape},
+    error::{busy, in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
     footprint::{self, Bounds},
     lowest,
     measured::{ErrorCheck, MOST_CONFIGURATIONS},
@@ -17,9 +18,10 @@ use super::{
     tally::Tally,
 };
 use crate::{
+    Error, MAX_AXES,
     contact::{MeshRipple, Model},
     dataset::{self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target},
-    memory,
+    error, memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
 };
@@ -111,14 +113,14 @@ impl<'a> Sweep<'a> {
     /// here, so that the same sweep makes the same file.
     ///
     /// # Errors
-    /// [`SweepError::Grid`].
-    pub fn new(scene: &Scene, object: &Object, backend: &str, adapter: &str, date: &str) -> Result<Self, SweepError> {
+    /// When the scene has no grid, or not one for the proxy's joints.
+    pub fn new(scene: &Scene, object: &Object, backend: &str, adapter: &str, date: &str) -> Result<Self, Error> {
         let grid = grid_of(scene);
         check_given(scene)?;
         if grid.joints() != scene.proxy.joints.len() {
-            return Err(SweepError::Grid(format!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
+            return Err(in_grid(format_args!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
         }
-        grid.check().map_err(SweepError::Grid)?;
+        grid.check().map_err(in_grid)?;
         let with_forces = scene.graphics.is_some();
         Ok(Self {
             shape: Shape {
@@ -173,8 +175,8 @@ impl<'a> Sweep<'a> {
     /// farther than [`FreeSpace::MARGIN`] grid steps from any contact, which become lower bounds.
     ///
     /// # Errors
-    /// [`SweepError::Grid`] when the model's proxy has other joints.
-    pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
+    /// When the model's proxy has other joints.
+    pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), Error> {
         self.model = Some(self.fitting(model)?);
         Ok(())
     }
@@ -183,8 +185,8 @@ impl<'a> Sweep<'a> {
     /// law minimises the energy: U then has no jumps. `model` is that of the scene.
     ///
     /// # Errors
-    /// [`SweepError::Grid`] when the model's proxy has other joints.
-    pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), SweepError> {
+    /// When the model's proxy has other joints.
+    pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), Error> {
         if lowest::applies(model.contact.law) {
             self.lowest = Some(self.fitting(model)?);
             self.shape.with_forces = true;
@@ -196,18 +198,19 @@ impl<'a> Sweep<'a> {
     /// those of the scene.
     ///
     /// # Errors
-    /// [`SweepError::Grid`] when the model's proxy has other joints, [`SweepError::Configurations`] when there are too
-    /// many.
+    /// When the model's proxy has other joints, or there are too many configurations.
     pub fn measure_error(
         &mut self,
         model: &'a Model<'a>,
         haptics: &HapticsSpec,
         configurations: Option<usize>,
-    ) -> Result<(), SweepError> {
+    ) -> Result<(), Error> {
         let (threshold, slope) = (haptics.threshold, haptics.boundary_slope);
         let (model, lowest) = (self.fitting(model)?, self.lowest.is_some());
         if let Some(asked) = configurations.filter(|asked| *asked > MOST_CONFIGURATIONS) {
-            return Err(SweepError::Configurations { asked });
+            return Err(error!(
+                "the error cannot be measured at {asked} configurations: {MOST_CONFIGURATIONS} are the most"
+            ));
         }
         let interpolation = haptics.interpolation;
         self.error = Some(ErrorCheck { model, threshold, slope, interpolation, configurations, lowest });
@@ -229,10 +232,10 @@ impl<'a> Sweep<'a> {
     }
 
     /// Tangents are stored where the model that solves gives them.
-    fn fitting(&mut self, model: &'a Model<'a>) -> Result<&'a Model<'a>, SweepError> {
+    fn fitting(&mut self, model: &'a Model<'a>) -> Result<&'a Model<'a>, Error> {
         let joints = model.chain.joints.len();
         if joints != self.grid.joints() {
-            return Err(SweepError::Grid(format!("{} axes for {joints} joints", self.grid.joints())));
+            return Err(in_grid(format_args!("{} axes for {joints} joints", self.grid.joints())));
         }
         self.shape.with_tangent = model.with_tangent;
         Ok(model)
@@ -281,11 +284,16 @@ impl<'a> Sweep<'a> {
     /// Sweeps in memory.
     ///
     /// # Errors
-    /// [`SweepError::Memory`], [`SweepError::Backend`], [`SweepError::Stopped`].
-    pub fn run<B: Backend>(&self, backend: &mut B, mut run: Run<'_>) -> Result<(Dataset, SweepReport), SweepError> {
+    /// When there is no memory, the backend fails, or the sweep is stopped.
+    pub fn run<B: Backend>(&self, backend: &mut B, mut run: Run<'_>) -> Result<(Dataset, SweepReport), Error> {
         let footprint = self.footprint(run.chunk, true);
         let (points, bytes) = (self.grid.points(), footprint.memory.least);
-        memory::check(bytes).map_err(|shortage| SweepError::Shortage { points, shortage })?;
+        memory::check(bytes).map_err(|shortage| {
+            error!(
+                "the grid's {points} points do not fit in memory: {shortage}; or haptize into a file (`haptize bake`), \
+                 which takes little memory whatever the grid"
+            )
+        })?;
         let mut chunks: Vec<(usize, Columns)> = Vec::new();
         let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut chunks)?;
@@ -297,7 +305,7 @@ impl<'a> Sweep<'a> {
         let never = AtomicBool::new(false);
         let results = Results::new(&table, points, shape, &never);
         let dataset = self.dataset(&results, provenance);
-        Ok((dataset.map_err(|source| SweepError::Memory { points, bytes, source })?, report))
+        Ok((dataset.map_err(|why| no_memory(points, bytes, why))?, report))
     }
 
     /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it
@@ -308,20 +316,20 @@ impl<'a> Sweep<'a> {
     /// results is an error.
     ///
     /// # Errors
-    /// Any [`SweepError`]; the part then keeps what is done, and an earlier file `output` is untouched.
+    /// When it fails or is stopped; the part then keeps what is done, and an earlier file `output` is untouched.
     pub fn bake<B: Backend>(
         &self,
         backend: &mut B,
         output: &Path,
         resume: bool,
         mut run: Run<'_>,
-    ) -> Result<SweepReport, SweepError> {
+    ) -> Result<SweepReport, Error> {
         if output.is_dir() {
-            return Err(SweepError::IsFolder { path: output.into() });
+            return Err(Error::at(output, "is a folder; name a file in it (-o)"));
         }
         // The part grows beside the file that a link leads to: only there can that be replaced.
-        let output = &dataset::resolved(output).map_err(|source| SweepError::Folder { path: output.into(), source })?;
-        dataset::check_place(output).map_err(SweepError::Output)?;
+        let output = &dataset::resolved(output).map_err(|source| unwritable(output, &source))?;
+        dataset::check_place(output)?;
         check_unclaimed(output)?;
         let mut binding = self.binding();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
@@ -339,16 +347,15 @@ impl<'a> Sweep<'a> {
         let target = Target::growing(output, &growing);
         let stop = run.stop;
         let kept_in = part.path().to_path_buf();
-        let unwritten = |source, points| {
+        let unwritten = |why: Error, points| {
             if stop.load(Ordering::Relaxed) {
-                SweepError::Stopped { done: points, points, part: Some(kept_in.clone()) }
-            } else {
-                SweepError::Dataset { part: kept_in.clone(), source }
+                return stopped(points, points, Some(&kept_in));
             }
+            let part = kept_in.display();
+            error!("{why}; all points are kept in {part}: afterwards give the same command, a bake with --resume")
         };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
-        let failed = |source| SweepError::Part { path: kept_in.clone(), source };
-        let map = part.map().map_err(failed)?;
+        let map = part.map().map_err(|source| in_part(&kept_in, &source))?;
         let mut table = part.table(&map, self.shape.width())?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
         check_unclaimed(output)?;
@@ -387,9 +394,9 @@ impl<'a> Sweep<'a> {
         table: &mut Table<'_>,
         stop: &AtomicBool,
         part: Option<&Path>,
-    ) -> Result<(SweepReport, Provenance), SweepError> {
+    ) -> Result<(SweepReport, Provenance), Error> {
         let (start, points) = (Instant::now(), self.grid.points());
-        let stopped = || SweepError::Stopped { done: points, points, part: part.map(Into::into) };
+        let stopped = || stopped(points, points, part);
         if let Some(model) = self.lowest {
             let lowered = lowest::correct(&self.grid, model, self.shape, table, stop).ok_or_else(stopped)?;
             if lowered.points > 0 {
@@ -460,14 +467,24 @@ impl<'a> Sweep<'a> {
 }
 
 /// Checks that `scene` has a grid.
-pub(super) fn check_given(scene: &Scene) -> Result<(), SweepError> {
-    if scene.grid.axes.is_empty() { Err(SweepError::NoGrid) } else { Ok(()) }
+pub(super) fn check_given(scene: &Scene) -> Result<(), Error> {
+    check_axes(scene)?;
+    if scene.grid.axes.is_empty() {
+        return Err("the scene leaves the grid out; `haptize reach SCENE --write` finds one and writes it there".into());
+    }
+    Ok(())
+}
+
+/// Checks that the arm has no more joints than a grid has axes.
+pub(super) fn check_axes(scene: &Scene) -> Result<(), Error> {
+    let joints = scene.proxy.joints.len();
+    if joints > MAX_AXES { Err(too_many_joints(joints)) } else { Ok(()) }
 }
 
 /// Checks that no other process writes the file `output`: it would be lost, or the dataset written over.
-fn check_unclaimed(output: &Path) -> Result<(), SweepError> {
+fn check_unclaimed(output: &Path) -> Result<(), Error> {
     // Where nobody can claim it nobody can write it either, which is told by who tries.
-    if matches!(Claim::new(output), Ok(None)) { Err(SweepError::Busy { path: output.into() }) } else { Ok(()) }
+    if matches!(Claim::new(output), Ok(None)) { Err(busy(output)) } else { Ok(()) }
 }
 
 /// CRC-32 of all that contact knows of `object`.

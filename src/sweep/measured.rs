@@ -18,10 +18,10 @@ use super::{
     thin_parts,
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Model, Solvers, Status},
     dataset::{Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
-    field::{FieldError, TorqueField},
+    field::TorqueField,
     random::Random,
     scene::{ContactLaw, ContactSpec, EffortNorm, Interpolation},
 };
@@ -91,7 +91,7 @@ impl ErrorCheck<'_> {
         table: &Table<'_>,
         contacts: usize,
         stop: &AtomicBool,
-    ) -> Result<Option<Measured>, FieldError> {
+    ) -> Result<Option<Measured>, Error> {
         let count = self.configurations.unwrap_or((contacts / 10).clamp(CONFIGURATIONS.start, CONFIGURATIONS.end));
         if count == 0 {
             return Ok(None);
@@ -128,7 +128,7 @@ impl ErrorCheck<'_> {
             let errors = reference.distances(|q| found.next().unwrap_or(*q));
             Ok(InterpolationError::of(interpolation.name(), errors))
         });
-        let mut error = reference.measured(self.interpolation, errors.collect::<Result<_, FieldError>>()?);
+        let mut error = reference.measured(self.interpolation, errors.collect::<Result<_, Error>>()?);
         error.geometry = self.geometry_error(&reference);
         error.friction = reference.friction_excess(self.model);
         let cells = places.par_iter().map(|place| {
@@ -166,7 +166,7 @@ fn interpolated(
     places: &[&Place],
     (interpolation, threshold, slope): (Interpolation, f64, &JointVector),
     whole: usize,
-) -> Result<Vec<JointVector>, FieldError> {
+) -> Result<Vec<JointVector>, Error> {
     let field = |lines: &[Range<usize>]| {
         TorqueField::interpolated(&window(grid, table, lines), interpolation, threshold, slope)
     };

@@ -5,27 +5,21 @@
 //! the dataset has the same bits.
 
 use super::{
-    Backend, Progress, Run, SceneObjectError, Shard, SweepError, SweepReport,
+    Backend, Progress, Run, Shard, SweepReport,
     bake::{model_of, sweep_of},
     build_object,
+    error::other_part,
     grid_sweep::Sweep,
     part::{Binding, Found, Part},
     shard::{EXTENSION, ranges},
     table::Block,
 };
-use crate::{
-    JointVector,
-    contact::Equilibrium,
-    input,
-    object::ObjectError,
-    proxy::Chain,
-    scene::{Scene, SceneError},
-};
+use crate::{Error, ErrorKind, JointVector, contact::Equilibrium, error, input, proxy::Chain, scene::Scene};
 use memmap2::Mmap;
 use std::{
     collections::BTreeMap,
     convert::Infallible,
-    fs, io,
+    fs,
     path::{Path, PathBuf},
     sync::atomic::AtomicBool,
 };
@@ -39,14 +33,16 @@ pub(super) struct Contents {
 
 impl Contents {
     /// Reads the file at `path`. What is behind the first damage does not count.
-    pub fn read(path: &Path) -> Result<Self, SweepError> {
-        let foreign = |reason: String| SweepError::ForeignPart { path: path.into(), reason };
-        let file = input::open(path).map_err(|error| foreign(error.to_string()))?;
+    ///
+    /// # Errors
+    /// Says what shows that it is no shard.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let file = input::open(path).map_err(|error| error.to_string())?;
         // SAFETY: the mapping is read-only, and a shard that has its name is not written to any more. Another program
         // that truncates it ends this process, as it would with any mapped file; no haptic loop reads it.
-        let map = unsafe { Mmap::map(&file) }.map_err(|error| foreign(error.to_string()))?;
-        let found = Found::read(&map).and_then(|found| found.ok_or_else(|| "its beginning is damaged".into()));
-        Ok(Self { path: path.into(), found: found.map_err(foreign)?, map })
+        let map = unsafe { Mmap::map(&file) }.map_err(|error| error.to_string())?;
+        let found = Found::read(&map)?.ok_or("its beginning is damaged")?;
+        Ok(Self { path: path.into(), found, map })
     }
 
     /// Everything on which its results depend.
@@ -60,96 +56,12 @@ impl Contents {
     }
 
     /// Whether this is the whole shard that `binding` is of.
-    pub fn is_whole_of(&self, binding: &Binding) -> Result<bool, SweepError> {
+    pub fn is_whole_of(&self, binding: &Binding) -> Result<bool, Error> {
         let its = self.binding();
         let different = binding.other_sweep(its).or((binding.shard != its.shard).then_some("another shard"));
         match different {
-            Some(difference) => Err(SweepError::OtherPart { path: self.path.clone(), difference }),
+            Some(difference) => Err(other_part(&self.path, difference)),
             None => Ok(self.is_whole()),
-        }
-    }
-}
-
-/// Shards cannot be merged.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MergeError {
-    /// No shard is there.
-    #[error(
-        "{path}: holds no shards (files ending in .{EXTENSION}); name the folder that `haptize bake --shard` wrote to"
-    )]
-    NoShards {
-        /// File that was read.
-        path: PathBuf,
-    },
-    /// A folder or file cannot be read.
-    #[error("{path}: cannot be read: {}", input::remedied(source))]
-    Unreadable {
-        /// Its path.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: io::Error,
-    },
-    /// A file that is no shard.
-    #[error("{path}: is no shard: {reason}; leave it out, or solve it anew with `haptize bake --shard`")]
-    NoShard {
-        /// Its path.
-        path: PathBuf,
-        /// Evidence of the damage, in words.
-        reason: String,
-    },
-    /// The output is in the way: it was left by another bake or merge.
-    #[error(
-        "{path}: holds what an unfinished bake or a merge of other shards has left; delete it, or choose another output"
-    )]
-    InTheWay {
-        /// Its path.
-        path: PathBuf,
-    },
-    /// Stopped from outside.
-    #[error("stopped; the same command continues")]
-    Stopped,
-    /// Shards of several bakes.
-    #[error("{path} does not belong to {other}: it was begun with {difference}; merge the shards of one bake")]
-    Different {
-        /// A shard.
-        path: PathBuf,
-        /// Another one.
-        other: PathBuf,
-        /// Difference, in words.
-        difference: &'static str,
-    },
-    /// Not all shards are there.
-    #[error(
-        "shards {missing} of {count} are missing; solve them with `haptize bake --shard I/{count}`, then merge again"
-    )]
-    Missing {
-        /// Their numbers, as schedulers take them.
-        missing: String,
-        /// Number of shards.
-        count: usize,
-    },
-    /// The scene in the shards is not valid.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The scene's object is refused.
-    #[error(transparent)]
-    Refused(#[from] SceneObjectError),
-    /// The object is too large for contact.
-    #[error(transparent)]
-    Object(#[from] ObjectError),
-    /// A file cannot be read or written.
-    #[error(transparent)]
-    Sweep(SweepError),
-}
-
-impl From<SweepError> for MergeError {
-    fn from(error: SweepError) -> Self {
-        match error {
-            SweepError::ForeignPart { path, reason } => Self::NoShard { path, reason },
-            SweepError::Unfinished { path } | SweepError::OtherPart { path, .. } => Self::InTheWay { path },
-            SweepError::Stopped { .. } => Self::Stopped,
-            other => Self::Sweep(other),
         }
     }
 }
@@ -178,16 +90,19 @@ impl Merge {
     ///
     /// # Errors
     /// When there are none, one cannot be read, or two are of different bakes.
-    pub fn gather(paths: &[PathBuf]) -> Result<Self, MergeError> {
+    pub fn gather(paths: &[PathBuf]) -> Result<Self, Error> {
         let (mut shards, mut notes, mut first) = (BTreeMap::<usize, Contents>::new(), Vec::new(), None);
         for file in files(paths)? {
-            let found = Contents::read(&file)?;
+            let found = Contents::read(&file).map_err(|reason| {
+                let remedy = "leave it out, or solve it again with `haptize bake --shard`";
+                Error::at(&file, format_args!("is not a shard: {reason}; {remedy}"))
+            })?;
             let (path, binding) = first.get_or_insert_with(|| (file.clone(), found.binding().clone()));
             let is_other = binding.shard.count != found.binding().shard.count;
             if let Some(difference) =
                 binding.other_sweep(found.binding()).or(is_other.then_some("another number of shards"))
             {
-                return Err(MergeError::Different { path: file, other: path.clone(), difference });
+                return Err(different(&file, path, difference));
             }
             let Shard { index, .. } = found.binding().shard;
             if !found.is_whole() {
@@ -199,7 +114,10 @@ impl Merge {
             }
         }
         let Some((_, binding)) = first else {
-            return Err(MergeError::NoShards { path: paths.first().cloned().unwrap_or_default() });
+            let what = format!(
+                "holds no shards (files ending in .{EXTENSION}); name the folder that `haptize bake --shard` wrote to"
+            );
+            return Err(Error::at(paths.first().map_or(Path::new(""), PathBuf::as_path), what));
         };
         Ok(Self { shards, count: binding.shard.count, notes })
     }
@@ -216,21 +134,29 @@ impl Merge {
         (0..self.count).filter(|index| !self.shards.contains_key(index)).collect()
     }
 
+    /// The error of a merge that lacks the shards `missing`.
+    pub(crate) fn lacks(&self, missing: &[usize]) -> Error {
+        let (missing, count) = (ranges(missing), self.count);
+        error!(
+            "shards {missing} of {count} are missing; solve them with `haptize bake --shard I/{count}`, then merge again"
+        )
+    }
+
     /// Puts the dataset `output` together, with its error measured at `measured` configurations as in
     /// [`super::Bake::measured`]. What an interrupted merge has left is continued.
     ///
     /// # Errors
-    /// Any [`MergeError`]; an earlier file `output` is then untouched.
+    /// When shards are missing, the output cannot be written, or the merge is stopped; an earlier file `output` is then untouched.
     pub fn to_file(
         &self,
         output: &Path,
         measured: Option<usize>,
         stop: &AtomicBool,
         progress: &mut dyn FnMut(Progress),
-    ) -> Result<Merged, MergeError> {
+    ) -> Result<Merged, Error> {
         let missing = self.missing();
         let Some(first) = self.shards.values().next().filter(|_| missing.is_empty()) else {
-            return Err(MergeError::Missing { missing: ranges(&missing), count: self.count });
+            return Err(self.lacks(&missing));
         };
         let mut binding = first.binding().clone();
         let dates = self.shards.values().map(|shard| shard.binding().provenance.date.clone());
@@ -241,17 +167,19 @@ impl Merge {
         let by = [&binding.provenance.backend, &binding.provenance.adapter, &binding.provenance.date];
         let sweep = sweep_of(&scene, &object, &model, by.map(String::as_str), measured)?;
         if let Some(difference) = sweep.binding().other_sweep(&binding) {
-            let (path, other) = (first.path.clone(), scene.path);
-            return Err(MergeError::Different { path, other, difference });
+            return Err(different(&first.path, &scene.path, difference));
         }
         self.copy(&sweep, output)?;
         let run = Run { chunk: 1, stop, progress };
-        let report = sweep.bake(&mut Idle, output, true, run)?;
+        let report = sweep.bake(&mut Idle, output, true, run).map_err(|error| match error.kind() {
+            ErrorKind::Stopped => error!("stopped; the same command continues").of(ErrorKind::Stopped),
+            _ => error,
+        })?;
         Ok(Merged { shards: self.count, report })
     }
 
     /// Copies what a part of `output` lacks into it.
-    fn copy(&self, sweep: &Sweep<'_>, output: &Path) -> Result<(), SweepError> {
+    fn copy(&self, sweep: &Sweep<'_>, output: &Path) -> Result<(), Error> {
         let path = Sweep::part_of(output);
         let mut binding = sweep.binding();
         let (mut part, tally) = Part::open(&path, true, &mut binding)?;
@@ -261,7 +189,9 @@ impl Merge {
         let begin = blocks.partition_point(|block| block.first < tally.points);
         let next = blocks.get(begin).map_or(binding.points(), |block| block.first);
         if next != tally.points {
-            return Err(SweepError::Unfinished { path });
+            let what = "holds what an unfinished bake or a merge of other shards has left; delete it, or choose another \
+                        output";
+            return Err(Error::at(&path, what));
         }
         for block in &blocks[begin..] {
             part.append(block)?;
@@ -288,11 +218,17 @@ impl Merge {
     }
 }
 
+/// The error of a shard at `path` of another bake than `other` is of.
+fn different(path: &Path, other: &Path, difference: &str) -> Error {
+    let remedy = "merge the shards of one bake";
+    Error::at(path, format_args!("does not belong to {}: it was begun with {difference}; {remedy}", other.display()))
+}
+
 /// The files among `paths`, and those in folders that end in [`EXTENSION`], sorted.
-fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, MergeError> {
+fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
     let mut files = Vec::new();
     for path in paths {
-        let unreadable = |source| MergeError::Unreadable { path: path.clone(), source };
+        let unreadable = |source| Error::unreadable(path, &source);
         if !fs::metadata(path).map_err(unreadable)?.is_dir() {
             files.push(path.clone());
             continue;

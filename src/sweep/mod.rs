@@ -35,16 +35,15 @@ mod tally;
 pub(crate) mod thin_parts;
 
 pub use crate::contact::Backend;
-pub use bake::{Bake, BakeError, SceneObjectError, baked, build_object, sample};
+pub use bake::{Bake, baked, build_object, sample};
 #[cfg(feature = "viewer")]
 pub(crate) use bake::{model_of, sweep_of};
 #[cfg(feature = "viewer")]
 pub(crate) use choice::is_worth_a_gpu;
-pub use choice::{BackendChoice, BackendError, ChosenBackend, OTHER_ADAPTER, remedied};
+pub use choice::{BackendChoice, ChosenBackend, OTHER_ADAPTER, remedied};
 pub use clearance::Clearance;
 pub use cpu::CpuBackend;
-pub use direct::{Direct, DirectError};
-pub use error::SweepError;
+pub use direct::Direct;
 pub use fallback::WithFallback;
 pub use footprint::{Bounds, Footprint};
 pub use forecast::Forecast;
@@ -53,12 +52,12 @@ pub use grid_sweep::{Progress, Run, Sweep, grid_of};
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use lowest::Lowered;
 pub use measured::MOST_CONFIGURATIONS;
-pub use merge::{Merge, MergeError, Merged};
-pub use node::{NoEnergy, check_law};
-pub use pilot::{Aim, AimError, Choice, Cost, Pilot, PilotError, Prospect, Trial};
+pub use merge::{Merge, Merged};
+pub use pilot::{Aim, Choice, Cost, Pilot, Prospect, Trial};
 pub use placing::Placing;
 pub use plan::{Plan, ShardCost};
-pub use reach::{DepthShare, JointReach, Reach, ReachError};
-pub use reference::{REFERENCE_TOLERANCE, ReferenceError};
+pub(crate) use reach::shallow;
+pub use reach::{DepthShare, JointReach, Reach};
+pub use reference::REFERENCE_TOLERANCE;
 pub use report::{Iterations, SweepReport};
 pub use shard::{EXTENSION as SHARD_EXTENSION, Shard, ranges};

@@ -22,7 +22,6 @@ use crate::{
     contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
     field::{GRADIENT_STEP, LEAST_ENERGY},
     joint_matrix,
-    scene::{ContactLaw, Scene},
     store::{
         Space,
         record::{mixed, slip_of, slope, width},
@@ -44,22 +43,6 @@ const FARTHEST: f64 = 2.0;
 
 /// Most Newton steps to the boundary: the gap is nearly linear, and each step squares the error.
 const STEPS: usize = 6;
-
-/// The scene's law of contact gives no energy with a tangent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the scene's law of contact is \"paper\", and nodes that refine a grid need the energy of contact with its tangent: leave \
-     law out of [contact], or bake the grid alone"
-)]
-pub struct NoEnergy;
-
-/// Checks that nodes can be solved of `scene`.
-///
-/// # Errors
-/// [`NoEnergy`] where its law is [`ContactLaw::Paper`].
-pub fn check_law(scene: &Scene) -> Result<(), NoEnergy> {
-    if scene.contact.law == ContactLaw::Paper { Err(NoEnergy) } else { Ok(()) }
-}
 
 /// A solved node.
 pub(super) struct Solved {
@@ -91,7 +74,7 @@ impl Scale {
     pub fn new(model: &Model<'_>, space: &Space) -> Self {
         let joints = space.joints();
         let steps: Vec<f64> = (0..joints).map(|a| space.step(0, a)).collect();
-        let first = space.configuration(0, &[0; crate::MAX_JOINTS]);
+        let first = space.configuration(0, &[0; crate::MAX_AXES]);
         let last = space.configuration(0, &space.last(0));
         let ranges: Vec<[f64; 2]> = first.iter().zip(last.iter()).map(|(first, last)| [*first, *last]).collect();
         let bounds = model.chain.jacobian_bounds(&ranges);

@@ -10,13 +10,17 @@
 //! interruption.
 
 use super::{
-    Shard, SweepError,
+    Shard,
     columns::Width,
+    error::{busy, foreign, in_part, other_part, unwritable},
     shard,
     table::{Block, Table},
     tally::Tally,
 };
-use crate::dataset::{Grid, Provenance, resolved};
+use crate::{
+    Error,
+    dataset::{Grid, Provenance, resolved},
+};
 use memmap2::Mmap;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -93,7 +97,7 @@ impl Binding {
             ("another tolerance", mine.tolerance != its.tolerance),
             ("another grid", self.grid != other.grid),
             ("another text of the scene", self.scene != other.scene),
-            ("another object, such as a mesh that changed meanwhile", self.object != other.object),
+            ("another object, such as a mesh that has changed since", self.object != other.object),
             ("another interpolation, for which tangents are stored or not", self.with_tangent != other.with_tangent),
             ("friction, for which slips are stored or not", self.with_slip != other.with_slip),
         ];
@@ -170,24 +174,24 @@ impl Found {
 impl Part {
     /// Begins a part at `path`, or with `resume` continues the one that is there, and counts its points; `binding` then
     /// takes its date and notices. Results that are there are never thrown away: without `resume` they are an error.
-    pub fn open(path: &Path, resume: bool, binding: &mut Binding) -> Result<(Self, Tally), SweepError> {
-        let failed = |source| SweepError::Part { path: path.into(), source };
+    pub fn open(path: &Path, resume: bool, binding: &mut Binding) -> Result<(Self, Tally), Error> {
+        let failed = |source| in_part(path, &source);
         if path.is_symlink() {
             // What it leads to is not this program's.
-            return Err(SweepError::ForeignPart { path: path.into(), reason: "it is a link".into() });
+            return Err(foreign(path, "it is a link"));
         }
         // A pipe would be waited for, and a device has no end.
-        resolved(path).map_err(|why| SweepError::ForeignPart { path: path.into(), reason: why.to_string() })?;
+        resolved(path).map_err(|why| foreign(path, why))?;
         let file = OpenOptions::new()
             .read(true)
             .write(true)
             .create(true)
             .truncate(false)
             .open(path)
-            .map_err(|source| SweepError::Folder { path: path.into(), source })?;
+            .map_err(|source| unwritable(path, &source))?;
         match file.try_lock() {
             Ok(()) => (),
-            Err(TryLockError::WouldBlock) => return Err(SweepError::Busy { path: path.into() }),
+            Err(TryLockError::WouldBlock) => return Err(busy(path)),
             // Some network file systems have no locks; only the second of two bakes at once would notice.
             Err(TryLockError::Error(_)) => (),
         }
@@ -195,11 +199,13 @@ impl Part {
         let map = part.map().map_err(failed)?;
         let (tally, end) = match part.found(&map)? {
             Some(found) if !resume && found.results < map.len() => {
-                return Err(SweepError::Unfinished { path: path.into() });
+                let what = "holds what an unfinished bake has solved; add --resume to go on with it, or delete it to begin \
+                            anew";
+                return Err(Error::at(path, what));
             }
             Some(found) if resume => {
                 if let Some(difference) = found.binding.difference(binding) {
-                    return Err(SweepError::OtherPart { path: path.into(), difference });
+                    return Err(other_part(path, difference));
                 }
                 binding.provenance.date = found.binding.provenance.date;
                 binding.provenance.notices.extend(found.notices);
@@ -225,35 +231,35 @@ impl Part {
     }
 
     /// What is in `map`, which is of this part; `None` where it ends before its binding does.
-    fn found(&self, map: &Mmap) -> Result<Option<Found>, SweepError> {
-        Found::read(map).map_err(|reason| SweepError::ForeignPart { path: self.path.clone(), reason })
+    fn found(&self, map: &Mmap) -> Result<Option<Found>, Error> {
+        Found::read(map).map_err(|reason| foreign(&self.path, reason))
     }
 
     /// Adds the results of the next points.
-    pub fn append(&mut self, block: &Block<'_>) -> Result<(), SweepError> {
+    pub fn append(&mut self, block: &Block<'_>) -> Result<(), Error> {
         let opening = block.opening();
         let mut body = vec![&opening[..]];
         body.extend(block.columns);
-        self.write(&body).map_err(|source| SweepError::Part { path: self.path.clone(), source })
+        self.write(&body).map_err(|source| in_part(&self.path, &source))
     }
 
     /// Adds something that provenance will tell.
-    pub fn note(&mut self, notice: &str) -> Result<(), SweepError> {
-        self.write(&[&NOTICE, notice.as_bytes()]).map_err(|source| SweepError::Part { path: self.path.clone(), source })
+    pub fn note(&mut self, notice: &str) -> Result<(), Error> {
+        self.write(&[&NOTICE, notice.as_bytes()]).map_err(|source| in_part(&self.path, &source))
     }
 
     /// Gives the part, which is whole now, its name, so that it is there after a power cut, too.
-    pub fn finish(self, file: &Path) -> Result<(), SweepError> {
+    pub fn finish(self, file: &Path) -> Result<(), Error> {
         let Self { path, file: part, .. } = self;
         let finished = part.sync_all().and_then(|()| std::fs::rename(&path, file));
-        finished.map_err(|source| SweepError::Part { path, source })
+        finished.map_err(|source| in_part(&path, &source))
     }
 
     /// Removes the part, whose points are all in a finished file now.
-    pub fn remove(self) -> Result<(), SweepError> {
+    pub fn remove(self) -> Result<(), Error> {
         let Self { path, file, .. } = self;
         drop(file);
-        std::fs::remove_file(&path).map_err(|source| SweepError::Part { path, source })
+        std::fs::remove_file(&path).map_err(|source| in_part(&path, &source))
     }
 
     /// Returns where it is.
@@ -278,7 +284,7 @@ impl Part {
     }
 
     /// The results in `map`, which is of this part.
-    pub fn table<'m>(&self, map: &'m Mmap, width: Width) -> Result<Table<'m>, SweepError> {
+    pub fn table<'m>(&self, map: &'m Mmap, width: Width) -> Result<Table<'m>, Error> {
         let blocks = self.found(map)?.map_or_else(Vec::new, |found| found.blocks(map).collect());
         Ok(Table::new(width, blocks))
     }

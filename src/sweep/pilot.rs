@@ -9,18 +9,18 @@
 //! grid: it is reported, and not promised.
 
 use super::{
-    BackendChoice, Bake, BakeError, ChosenBackend, Footprint, Sweep, build_object,
-    grid_sweep::check_given,
-    reference::{Reference, ReferenceError},
+    BackendChoice, Bake, ChosenBackend, Footprint, Sweep, build_object, grid_sweep::check_given, reference::Reference,
     sample, spacing,
 };
 use crate::{
+    Error,
     contact::Model,
     dataset::Dataset,
-    field::{FieldError, TorqueField},
-    object::{Object, ObjectError},
+    error,
+    field::TorqueField,
+    object::Object,
     proxy::Chain,
-    scene::{ContactSpec, EffortNorm, Interpolation, NormUnit, Scene, SceneError},
+    scene::{ContactSpec, EffortNorm, Interpolation, NormUnit, Scene},
 };
 use serde::Serialize;
 use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
@@ -61,23 +61,18 @@ pub enum Aim {
     Absolute(f64, &'static str),
 }
 
-/// An error was given in a unit that the norm of the arm's torque does not have.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("an error in {given} was asked for, but that of this arm is measured in {norm}: give it in {}", norm.name())]
-pub struct AimError {
-    given: &'static str,
-    norm: NormUnit,
-}
-
 impl Aim {
     /// The same, if it has the unit of the norm of the torque of the arm of `scene`.
     ///
     /// # Errors
     /// Where it has another.
-    pub fn checked(self, scene: &Scene) -> Result<Self, AimError> {
+    pub fn checked(self, scene: &Scene) -> Result<Self, Error> {
         let unit = EffortNorm::of(scene).unit;
         match self {
-            Self::Absolute(_, given) if given != unit.name() => Err(AimError { given, norm: unit }),
+            Self::Absolute(_, given) if given != unit.name() => Err(error!(
+                "an error in {given} was asked for, but that of this arm is measured in {unit}: give it in {}",
+                unit.name()
+            )),
             _ => Ok(self),
         }
     }
@@ -208,33 +203,6 @@ pub struct Choice {
     pub footprint: Footprint,
 }
 
-/// No grid was chosen.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PilotError {
-    /// The object cannot be built.
-    #[error(transparent)]
-    Object(#[from] ObjectError),
-    /// Nothing to compare with.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
-    /// The error that was asked for has another unit.
-    #[error(transparent)]
-    Aim(#[from] AimError),
-    /// A coarse grid cannot be baked.
-    #[error(transparent)]
-    Bake(#[from] BakeError),
-    /// A grid cannot be interpolated.
-    #[error(transparent)]
-    Field(#[from] FieldError),
-    /// The scene cannot be changed as it should be.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// No grid within reach has so small an error.
-    #[error("{0}")]
-    OutOfReach(String),
-}
-
 /// Where scene and object are.
 struct Ground {
     object: Object,
@@ -242,11 +210,11 @@ struct Ground {
 }
 
 impl Ground {
-    fn new(scene: &Scene) -> Result<Self, BakeError> {
+    fn new(scene: &Scene) -> Result<Self, Error> {
         Ok(Self { object: build_object(scene)?, chain: Chain::new(&scene.proxy) })
     }
 
-    fn model(&self, scene: &Scene) -> Result<Model<'_>, ObjectError> {
+    fn model(&self, scene: &Scene) -> Result<Model<'_>, Error> {
         Model::reaching(&self.object, &self.chain, scene.contact, &sample(scene))
     }
 }
@@ -255,9 +223,9 @@ impl Pilot {
     /// Tries `scene` for `aim`.
     ///
     /// # Errors
-    /// Any [`PilotError`] but [`PilotError::OutOfReach`].
-    pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, PilotError> {
-        check_given(scene).map_err(BakeError::from)?;
+    /// When the scene has no grid, or a coarse one cannot be baked, or there is nothing to compare with.
+    pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, Error> {
+        check_given(scene)?;
         let aim = aim.checked(scene)?;
         let ground = Ground::new(scene)?;
         let model = ground.model(scene)?;
@@ -325,12 +293,12 @@ impl Pilot {
     /// Chooses the fewest points, at most `limit`, with which the measured order keeps the aim.
     ///
     /// # Errors
-    /// [`PilotError::OutOfReach`] where there are none; it says what the pilot measured, and what would help.
-    pub fn choose(&self, scene: &Scene, limit: usize, backend: BackendChoice) -> Result<Choice, PilotError> {
+    /// When there are none; the error says what the pilot measured, and what would help.
+    pub fn choose(&self, scene: &Scene, limit: usize, backend: BackendChoice) -> Result<Choice, Error> {
         let within = |best: &&Prospect| best.points <= limit as f64 && best.finer <= FARTHEST_EXTRAPOLATION;
         let best = self.prospects.first();
         let Some(best) = best.filter(within) else {
-            return Err(PilotError::OutOfReach(self.refused(best, limit)));
+            return Err(self.refused(best, limit).into());
         };
         let mut chosen = self.spaced(scene, best.finer);
         chosen.contact.tolerance = self.tolerance;
@@ -415,10 +383,10 @@ fn prospects(trials: &[Trial], aim: f64, joints: usize) -> Vec<Prospect> {
 }
 
 /// The roughest tolerance of the solver that adds no more than `error` to the error; the scene's own where none does.
-fn tolerance(scene: &Scene, model: &Model<'_>, reference: &Reference, error: f64) -> Result<f64, PilotError> {
+fn tolerance(scene: &Scene, model: &Model<'_>, reference: &Reference, error: f64) -> Result<f64, Error> {
     for tolerance in TOLERANCES {
         let contact = ContactSpec { tolerance, ..scene.contact };
-        if reference.error_of(model, contact).map_err(ReferenceError::from)? <= error {
+        if reference.error_of(model, contact)? <= error {
             return Ok(tolerance);
         }
     }
@@ -430,17 +398,17 @@ fn errors(
     reference: &Reference,
     dataset: &Dataset,
     interpolation: Interpolation,
-) -> Result<(f64, f64), FieldError> {
+) -> Result<(f64, f64), Error> {
     let spec = &scene.haptics;
     let field = TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)?;
     Ok(reference.errors(|q| field.sample(q).torque))
 }
 
 /// Returns the memory and disk space that baking `scene` into a file takes.
-fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, PilotError> {
+fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, Error> {
     let ground = Ground::new(scene)?;
     let model = ground.model(scene)?;
-    let backend = ChosenBackend::open(backend, &model).map_err(BakeError::from)?;
-    let sweep = Sweep::new(scene, &ground.object, "", "", "").map_err(BakeError::from)?;
+    let backend = ChosenBackend::open(backend, &model)?;
+    let sweep = Sweep::new(scene, &ground.object, "", "", "")?;
     Ok(sweep.footprint(backend.chunk(), false))
 }

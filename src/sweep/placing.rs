@@ -1,13 +1,13 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::{BakeError, build_object};
+use super::{build_object, grid_sweep::check_axes};
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Model, Proximity},
-    object::Object,
-    proxy::{Chain, PRESS_GAP, Press, inverse_kinematics::approach},
+    object::{Object, corners},
+    proxy::{Chain, PRESS_GAP, Posture, Press, inverse_kinematics::approach, of_last_link},
     random::Random,
-    scene::{Scene, Shape},
+    scene::Scene,
 };
 use glam::DVec3;
 use serde::Serialize;
@@ -24,6 +24,12 @@ const SEED: u64 = 7;
 /// Distance from the point before the surface at which the tip counts as there, over the gap that it is to keep (1).
 const REACHED: f64 = 0.01;
 
+/// Room about the whole arm with which a posture is taken, over the gap that the tip is to keep (1).
+const CLEAR: f64 = 0.5;
+
+/// To what the motion of an object is rounded (m): a scene shows it so.
+const ROUNDED_TO: f64 = 1e-4;
+
 /// What an arm and an object are to each other.
 #[derive(Clone, Debug, Serialize)]
 pub struct Placing {
@@ -33,7 +39,7 @@ pub struct Placing {
     pub centre: DVec3,
     /// The joint whose link carries the tip.
     pub link: String,
-    /// Number of the contact node at the tip: of the last link with nodes, the one that is farthest from its joint.
+    /// Number of the contact node at the tip, which is the first of its link to meet the object.
     pub tip: usize,
     /// Where the tip is with every joint in the middle of its limits (m).
     pub at: DVec3,
@@ -56,64 +62,97 @@ pub struct Placing {
 
 impl Placing {
     /// Puts the tip of the arm of `scene` before the point of the object's surface that is nearest to `wanted`, by
-    /// default to the tip in the middle of the joints' limits.
+    /// default to the tip in the middle of the joints' limits. `None` where the arm has no contact node.
     ///
     /// # Errors
     /// When the object is refused.
-    pub fn new(scene: &Scene, wanted: Option<DVec3>) -> Result<Self, BakeError> {
-        let (Shape::Sphere { centre, .. }
-        | Shape::Icosphere { centre, .. }
-        | Shape::Mesh { centre, .. }
-        | Shape::Tetrahedra { centre, .. }) = scene.object.shape;
-        let object = build_object(scene)?;
+    pub fn new(scene: &Scene, wanted: Option<DVec3>) -> Result<Option<Self>, Error> {
+        if scene.proxy.joints.iter().all(|joint| joint.nodes.is_empty()) {
+            return Ok(None);
+        }
+        check_axes(scene)?;
+        Self::from(scene, &build_object(scene)?, wanted, None).map(Some)
+    }
+
+    /// Moves the object of `scene` before the tip of its arm, to be pressed from above where the arm does that easily.
+    /// Returns its motion (m), and what arm and object are to each other there; `None` where the arm has no contact node.
+    ///
+    /// # Errors
+    /// When the object is refused.
+    pub fn brought(scene: &Scene) -> Result<Option<(DVec3, Self)>, Error> {
+        check_axes(scene)?;
+        let (mut object, chain) = (build_object(scene)?, Chain::new(&scene.proxy));
+        let body = corners(&object.rest[..object.surface_nodes]);
+        let standoff = PRESS_GAP * length(body);
+        let mut best: Option<(Posture, DVec3, DVec3, f64)> = None;
+        for posture in Posture::all(&chain, Some(DVec3::NEG_Z)) {
+            let surface = object.rest[..object.surface_nodes].iter();
+            let along = |node: &&DVec3| node.dot(posture.direction);
+            let Some(&foremost) = surface.min_by(|a, b| along(a).total_cmp(&along(b))) else { break };
+            let node = &chain.nodes[posture.node];
+            let pressed = posture.nodes[posture.node] + (node.radius + standoff) * posture.direction;
+            let motion = pressed - foremost;
+            let motion = (motion / ROUNDED_TO).round() * ROUNDED_TO;
+            let room = |x: DVec3| (x - x.clamp(body[0] + motion, body[1] + motion)).length();
+            let clear = posture.nodes.iter().zip(&chain.nodes).map(|(x, node)| room(*x) - node.radius);
+            let clear = clear.fold(f64::INFINITY, f64::min);
+            if best.as_ref().is_none_or(|(.., other)| clear > *other) {
+                best = Some((posture, motion, foremost + motion, clear));
+            }
+            if clear > CLEAR * standoff {
+                break;
+            }
+        }
+        let Some((posture, motion, pressed, _)) = best else { return Ok(None) };
+        object.rest.iter_mut().for_each(|node| *node += motion);
+        let placing = Self::from(scene, &object, Some(pressed), Some(&posture))?;
+        Ok(Some((motion, Self { centre: scene.object.shape.centre() + motion, ..placing })))
+    }
+
+    /// The same for `object`, which was built of the scene and perhaps moved; begins from `posture`, where there is one.
+    fn from(scene: &Scene, object: &Object, wanted: Option<DVec3>, posture: Option<&Posture>) -> Result<Self, Error> {
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
-        let model = Model::reaching(&object, &chain, scene.contact, &[])?;
+        let model = Model::reaching(object, &chain, scene.contact, &[])?;
         let mut middle = JointVector::zeros(chain.joints.len());
         middle.iter_mut().zip(&chain.joints).for_each(|(q, joint)| *q = 0.5 * (joint.limits[0] + joint.limits[1]));
         let mut pose = chain.new_pose();
         chain.pose(&middle, &mut pose);
-        let tip = tip(&chain);
-        let (node, at) = (&chain.nodes[tip], pose.nodes[tip]);
-        let body = body(&object);
-        let length = PRESSED * (body[1] - body[0]).min_element();
+        let tip = posture.map_or_else(|| farthest(&chain), |posture| posture.node);
+        let at = pose.nodes[tip];
+        let body = corners(&object.rest[..object.surface_nodes]);
+        let length = length(body);
         let surface = &model.surface;
         let closest = surface.closest(wanted.unwrap_or(at) - surface.centre, u32::MAX);
         let point = surface.centre + surface.facet_at_rest(closest.triangle).point(closest.point.weights);
         let normal = surface.pseudonormal_at_rest(closest.triangle, &closest.point).normalize_or(DVec3::Z);
         let standoff = PRESS_GAP * length;
-        let before = point + (node.radius + standoff) * normal;
+        let aim = Aim { point, normal, standoff };
         let (mut random, mut proximity) = (Random::new(SEED), Proximity::new(&model));
-        let mut best: Option<(JointVector, DVec3, f64)> = None;
+        let mut best: Option<Attempt> = None;
         for number in 0..POSTURES {
-            let mut start = middle;
+            let mut start = posture.map_or(middle, |posture| posture.q);
             if number > 0 {
                 let joints = start.iter_mut().zip(&chain.joints);
                 joints.for_each(|(q, joint)| *q = random.between(joint.limits[0], joint.limits[1]));
             }
-            let (q, _) = approach(&chain, tip, before, &start);
-            chain.pose(&q, &mut pose);
-            let (short, gap) = (before - pose.nodes[tip], proximity.gap(&q));
-            let reaches = |short: &DVec3| short.length() < REACHED * standoff;
-            let is_better = best.as_ref().is_none_or(|(_, other, room)| match (reaches(&short), reaches(other)) {
-                (true, true) => gap > *room,
-                (false, false) => short.length() < other.length(),
-                (here, _) => here,
-            });
-            if is_better {
-                best = Some((q, short, gap));
+            let attempt = aim.attempt(&mut proximity, tip, start);
+            if best.as_ref().is_none_or(|best| attempt.is_better(best, standoff)) {
+                best = Some(attempt);
             }
-            if reaches(&short) && gap > 0.5 * standoff {
+            if best.as_ref().is_some_and(|best| best.reaches(standoff) && best.gap > CLEAR * standoff) {
                 break;
             }
         }
-        let (q, short, gap) = best.unwrap_or((middle, before - at, f64::INFINITY));
+        let Attempt { q, tip, short, gap } =
+            best.unwrap_or(Attempt { q: middle, tip, short: point - at, gap: f64::INFINITY });
+        chain.pose(&middle, &mut pose);
         Ok(Self {
             body,
-            centre,
-            link: chain.joints[node.link].name.clone(),
+            centre: scene.object.shape.centre(),
+            link: chain.joints[chain.nodes[tip].link].name.clone(),
             tip,
-            at,
+            at: pose.nodes[tip],
             point,
             normal,
             press: Press::along(&chain, q, tip, -normal, length),
@@ -137,19 +176,67 @@ impl Placing {
     }
 }
 
-/// The contact node at the end of the arm.
-fn tip(chain: &Chain) -> usize {
-    let last = chain.nodes.last().map_or(0, |node| node.link);
-    let of_last = chain.nodes.iter().enumerate().filter(|(_, node)| node.link == last);
-    let far = of_last.max_by(|(_, a), (_, b)| a.position.length().total_cmp(&b.position.length()));
-    far.map_or(0, |(number, _)| number)
+/// Where a contact node is to stand before a surface.
+struct Aim {
+    point: DVec3,
+    normal: DVec3,
+    standoff: f64,
 }
 
-/// Corners of the box around the object's surface (m).
-fn body(object: &Object) -> [DVec3; 2] {
-    let nodes = &object.rest[..object.surface_nodes];
-    [
-        nodes.iter().copied().fold(DVec3::INFINITY, DVec3::min),
-        nodes.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max),
-    ]
+/// A configuration that inverse kinematics came to.
+struct Attempt {
+    q: JointVector,
+    /// The contact node that stands before the point.
+    tip: usize,
+    /// See [`Placing::short`].
+    short: DVec3,
+    /// See [`Placing::gap`].
+    gap: f64,
+}
+
+impl Aim {
+    /// Takes contact node `tip` there, beginning at `start`. Where another node of its link is then nearer to the
+    /// object, that one is the tip.
+    fn attempt(&self, proximity: &mut Proximity<'_>, mut tip: usize, start: JointVector) -> Attempt {
+        let chain = proximity.model().chain;
+        let (mut tried, mut q) = (vec![tip], start);
+        loop {
+            let before = self.point + (chain.nodes[tip].radius + self.standoff) * self.normal;
+            (q, _) = approach(chain, tip, before, &q);
+            let nearest = proximity.nearest(&q);
+            let attempt = Attempt { q, tip, short: before - proximity.pose().nodes[tip], gap: nearest.gap };
+            let is_of_link = chain.nodes[nearest.node].link == chain.nodes[tip].link;
+            if attempt.gap > CLEAR * self.standoff || !is_of_link || tried.contains(&nearest.node) {
+                return attempt;
+            }
+            tip = nearest.node;
+            tried.push(tip);
+        }
+    }
+}
+
+impl Attempt {
+    fn reaches(&self, standoff: f64) -> bool {
+        self.short.length() < REACHED * standoff
+    }
+
+    /// Whether it is nearer to the point, or there with more room about the arm.
+    fn is_better(&self, other: &Self, standoff: f64) -> bool {
+        match (self.reaches(standoff), other.reaches(standoff)) {
+            (true, true) => self.gap > other.gap,
+            (false, false) => self.short.length() < other.short.length(),
+            (here, _) => here,
+        }
+    }
+}
+
+/// The contact node at the end of the arm: of the last link with nodes, the one that is farthest from its joint.
+fn farthest(chain: &Chain) -> usize {
+    let far = |node: &usize| chain.nodes[*node].position.length();
+    of_last_link(chain).max_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0)
+}
+
+/// Length by which a press on a body of these corners is measured (m).
+fn length(body: [DVec3; 2]) -> f64 {
+    PRESSED * (body[1] - body[0]).min_element()
 }

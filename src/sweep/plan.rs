@@ -3,8 +3,8 @@
 //! Which points are skipped is found out for the whole grid, as each shard does. The time of the others is shared out
 //! from the forecast of the whole sweep (`forecast.rs`).
 
-use super::{BackendChoice, Bake, BakeError, ChosenBackend, Forecast, Shard};
-use crate::{memory, scene::Scene};
+use super::{BackendChoice, Bake, ChosenBackend, Forecast, Shard};
+use crate::{Error, memory, scene::Scene};
 use serde::Serialize;
 use std::{sync::atomic::AtomicBool, time::Instant};
 
@@ -53,8 +53,8 @@ impl Plan {
     /// Plans the bake of `scene` by `backend` in `count` shards.
     ///
     /// # Errors
-    /// Any [`BakeError`].
-    pub fn new(scene: &Scene, backend: BackendChoice, count: usize, stop: &AtomicBool) -> Result<Self, BakeError> {
+    /// When the object or the grid is refused, or the sample is stopped.
+    pub fn new(scene: &Scene, backend: BackendChoice, count: usize, stop: &AtomicBool) -> Result<Self, Error> {
         let start = Instant::now();
         let bake = Bake { scene, backend, measured: Some(0), aim: None, date: "", stop, progress: &mut |_| () };
         bake.prepared(|sweep, backend, run| {

@@ -5,14 +5,15 @@
 //! most as deep as asked for; the grid's ranges are the least box that holds all of it that was met. Its lines are so
 //! far apart that a step along any axis moves the proxy by about as much as along any other.
 
-use super::{BakeError, build_object, spacing};
+use super::{build_object, grid_sweep::check_axes, spacing};
 use crate::{
-    JointVector,
+    Error, ErrorKind, JointVector,
     contact::{Model, NodeTree},
-    object::Object,
+    error,
+    object::{Object, corners},
     proxy::Chain,
     random::Random,
-    scene::{AxisSpec, Scene, SceneError},
+    scene::{AxisSpec, Scene},
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -107,33 +108,6 @@ pub struct Reach {
     pub depths: Vec<DepthShare>,
 }
 
-/// No ranges were found.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReachError {
-    /// The object is refused, or too large.
-    #[error(transparent)]
-    Bake(#[from] BakeError),
-    /// Nothing touches.
-    #[error(
-        "the proxy touches the object at none of {configurations} random configurations within the joint \
-         limits{depth}: move the object or the arm, widen the limits (limits of [[proxy.joint]]), or allow for deeper \
-         contact (--depth)"
-    )]
-    NoContact {
-        /// Configurations measured.
-        configurations: usize,
-        /// Requested depth, if there is deeper contact.
-        depth: String,
-    },
-    /// The scene cannot take the grid.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Stopped from outside.
-    #[error("stopped; nothing was written")]
-    Stopped,
-}
-
 /// Depth and status at a configuration.
 #[derive(Clone, Copy)]
 struct Met {
@@ -147,20 +121,21 @@ impl Reach {
     /// default a fifth of the body's size (m).
     ///
     /// # Errors
-    /// Any [`ReachError`].
-    pub fn new(scene: &Scene, depth: Option<f64>, stop: &AtomicBool) -> Result<Self, ReachError> {
-        let object = build_object(scene).map_err(BakeError::from)?;
+    /// When the object is refused, nothing touches, or `stop` is raised.
+    pub fn new(scene: &Scene, depth: Option<f64>, stop: &AtomicBool) -> Result<Self, Error> {
+        check_axes(scene)?;
+        let object = build_object(scene)?;
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
-        let model = Model::reaching(&object, &chain, scene.contact, &[]).map_err(BakeError::from)?;
+        let model = Model::reaching(&object, &chain, scene.contact, &[])?;
         let (tree, body) = (NodeTree::new(&chain), size(&object));
-        let shallow = depth.unwrap_or(SHALLOW * body);
+        let shallow = depth.unwrap_or_else(|| self::shallow(&object));
         let is_shallow = |met: &Met| met.gap < 0.0 && -met.gap <= shallow;
         let mut random = Random::new(SEED);
         let mut met: Vec<Met> = Vec::new();
         for _ in 0..ROUNDS {
             if stop.load(Ordering::Relaxed) {
-                return Err(ReachError::Stopped);
+                return Err(error!("stopped; nothing was written").of(ErrorKind::Stopped));
             }
             met.extend(measured(&model, &tree, scene, &mut random));
             if met.iter().filter(|met| is_shallow(met)).count() >= CONTACTS {
@@ -172,7 +147,12 @@ impl Reach {
         if wanted.is_empty() {
             let depth =
                 if touching.is_empty() { String::new() } else { format!(" by at most {:.1} mm", shallow * 1e3) };
-            return Err(ReachError::NoContact { configurations: met.len(), depth });
+            let configurations = met.len();
+            return Err(error!(
+                "the proxy touches the object at none of {configurations} random configurations within the joint \
+                 limits{depth}: move the object or the arm, widen the limits (limits of [[proxy.joint]]), or allow for \
+                 deeper contact (--depth)"
+            ));
         }
         let joints: Vec<JointReach> =
             (0..scene.proxy.joints.len()).map(|joint| along(scene, joint, &met, &wanted)).collect();
@@ -224,8 +204,8 @@ impl Reach {
     /// as any error wants it.
     ///
     /// # Errors
-    /// [`ReachError::Scene`].
-    pub fn scene(&self, scene: &Scene) -> Result<Scene, ReachError> {
+    /// When the scene cannot take the grid.
+    pub fn scene(&self, scene: &Scene) -> Result<Scene, Error> {
         let ranges: Vec<[f64; 2]> = self.joints.iter().map(|joint| joint.range).collect();
         let mut motion = vec![0.0_f64; ranges.len()];
         for bound in Chain::new(&scene.proxy).jacobian_bounds(&ranges) {
@@ -254,9 +234,13 @@ impl Reach {
 
 /// Least extent of the object's surface along an axis of space (m).
 fn size(object: &Object) -> f64 {
-    let nodes = &object.rest[..object.surface_nodes];
-    let bounds = nodes.iter().map(|node| (*node, *node)).reduce(|(low, high), (a, b)| (low.min(a), high.max(b)));
-    bounds.map_or(0.0, |(low, high)| (high - low).min_element())
+    let [low, high] = corners(&object.rest[..object.surface_nodes]);
+    (high - low).min_element()
+}
+
+/// Depth up to which contact with `object` counts as shallow (m).
+pub(crate) fn shallow(object: &Object) -> f64 {
+    SHALLOW * size(object)
 }
 
 /// A round of random configurations within the joint limits.

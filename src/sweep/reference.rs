@@ -1,12 +1,13 @@
 //! Directly solved configurations, each solved once, and the distance of other answers from them.
 
-use super::{Backend, BackendError, CpuBackend, table::PointResult};
+use super::{Backend, CpuBackend, table::PointResult};
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Equilibrium, Model, Slip, Solvers, Status, exact_dissipation},
     dataset::{FrictionExcess, InterpolationError, MeasuredError},
+    error,
     random::Random,
-    scene::{ContactLaw, ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
+    scene::{ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
 };
 
 /// Relative residual to which the reference of an accuracy study is solved (1): three decades below the scenes' own
@@ -36,21 +37,6 @@ pub(crate) struct Reference {
     /// rms of the torque (the norm's unit).
     pub torque: f64,
     pub norm: EffortNorm,
-}
-
-/// There is nothing to compare with.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReferenceError {
-    /// No backend.
-    #[error(transparent)]
-    Backend(#[from] BackendError),
-    /// Nothing touches, or nothing converges.
-    #[error(
-        "the proxy touches nothing, or contact converges nowhere, at {0} random configurations: give the scene's \
-         grid a region where the proxy touches the object"
-    )]
-    NoContact(usize),
 }
 
 impl Reference {
@@ -84,25 +70,19 @@ impl Reference {
     }
 
     /// Solves `count` random configurations within the grid of `scene`, the same ones every time for the same `seed`.
-    pub fn solve(scene: &Scene, model: &Model<'_>, seed: u64, count: usize) -> Result<Self, ReferenceError> {
+    pub fn solve(scene: &Scene, model: &Model<'_>, seed: u64, count: usize) -> Result<Self, Error> {
         Self::drawn(scene, model, seed, count, 0)
     }
 
     /// As [`Reference::solve`], with twice as many configurations again and again until `contacts` of them are in
     /// contact, or no more are drawn.
-    pub fn in_contact(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
+    pub fn in_contact(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, Error> {
         Self::drawn(scene, model, seed, 2 * contacts, contacts)
     }
 
-    fn drawn(
-        scene: &Scene,
-        model: &Model<'_>,
-        seed: u64,
-        mut count: usize,
-        contacts: usize,
-    ) -> Result<Self, ReferenceError> {
+    fn drawn(scene: &Scene, model: &Model<'_>, seed: u64, mut count: usize, contacts: usize) -> Result<Self, Error> {
         let model = model.with_contact(tight(scene.contact, REFERENCE_TOLERANCE));
-        let mut backend = CpuBackend::new(&model, 0).map_err(BackendError::from)?;
+        let mut backend = CpuBackend::new(&model, 0)?;
         let mut random = Random::new(seed);
         let mut reference = Self::of(EffortNorm::of(scene), []);
         let mut place = |_| {
@@ -121,7 +101,13 @@ impl Reference {
             }
             count *= 2;
         }
-        if reference.in_contact == 0 { Err(ReferenceError::NoContact(count)) } else { Ok(reference) }
+        if reference.in_contact == 0 {
+            return Err(error!(
+                "the proxy touches nothing, or contact converges nowhere, at {count} random configurations: give the \
+                 scene's grid a region where the proxy touches the object"
+            ));
+        }
+        Ok(reference)
     }
 
     /// Number of configurations that were solved.
@@ -135,12 +121,12 @@ impl Reference {
     }
 
     /// Its own error, rms: distance of the same configurations solved a hundred times as roughly (N m).
-    pub fn own_error(&self, scene: &Scene, model: &Model<'_>) -> Result<f64, BackendError> {
+    pub fn own_error(&self, scene: &Scene, model: &Model<'_>) -> Result<f64, Error> {
         self.error_of(model, tight(scene.contact, 100.0 * REFERENCE_TOLERANCE))
     }
 
     /// Rms distance of the same configurations solved as `contact` says (N m).
-    pub fn error_of(&self, model: &Model<'_>, contact: ContactSpec) -> Result<f64, BackendError> {
+    pub fn error_of(&self, model: &Model<'_>, contact: ContactSpec) -> Result<f64, Error> {
         let solved = equilibria(model, contact, &self.places)?;
         let mut torques = solved.iter().map(|equilibrium| equilibrium.torque);
         Ok(self.errors(|q| torques.next().unwrap_or(*q)).0)
@@ -240,11 +226,10 @@ fn excess(model: &Model<'_>, q: &JointVector, (here, slip): (&Equilibrium, &Slip
     (exact > 0.0).then(|| slip.dissipation(&rates) / exact - 1.0)
 }
 
-/// `contact` with the geometry that it has, the energy form's where it is the paper's, solved to `tolerance`.
+/// `contact` solved to `tolerance`.
 pub(super) fn tight(contact: ContactSpec, tolerance: f64) -> ContactSpec {
     let max_iterations = contact.max_iterations.saturating_mul(10);
-    let law = if contact.law == ContactLaw::Paper { ContactLaw::Following } else { contact.law };
-    ContactSpec { law, tolerance, max_iterations, ..contact }
+    ContactSpec { tolerance, max_iterations, ..contact }
 }
 
 /// `places` solved as `contact` says, on all cores.
@@ -252,7 +237,7 @@ pub(crate) fn equilibria(
     model: &Model<'_>,
     contact: ContactSpec,
     places: &[JointVector],
-) -> Result<Vec<Equilibrium>, BackendError> {
+) -> Result<Vec<Equilibrium>, Error> {
     let model = model.with_contact(contact);
     let mut backend = CpuBackend::new(&model, 0)?;
     Ok(backend.solve(places).unwrap_or_else(|never| match never {}))

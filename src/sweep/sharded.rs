@@ -1,6 +1,13 @@
 //! The sweep of one shard, into a file of its own, and what all shards will take.
 
-use super::{Backend, Run, Shard, Sweep, SweepError, SweepReport, chunks::Begun, merge::Contents, part::Part};
+use super::{
+    Backend, Run, Shard, Sweep, SweepReport,
+    chunks::Begun,
+    error::{foreign, unwritable},
+    merge::Contents,
+    part::Part,
+};
+use crate::Error;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -8,7 +15,7 @@ use std::{
 
 impl Sweep<'_> {
     /// Number of points that are not skipped, of each of `count` shards.
-    pub(super) fn solved_of_shards(&self, count: usize) -> Result<Vec<usize>, SweepError> {
+    pub(super) fn solved_of_shards(&self, count: usize) -> Result<Vec<usize>, Error> {
         let (points, any) = (self.grid.points(), Shard { index: 0, count });
         let (mut solved, mut done) = (vec![0; count], 0);
         let free_space = self.free_space();
@@ -27,22 +34,22 @@ impl Sweep<'_> {
     /// Continues an interrupted run; a whole file is left as it is, and `None` returned with it.
     ///
     /// # Errors
-    /// Any [`SweepError`]; the part then keeps what is done.
+    /// When it fails or is stopped; the part then keeps what is done.
     pub fn bake_shard<B: Backend>(
         &mut self,
         backend: &mut B,
         folder: &Path,
         shard: Shard,
         mut run: Run<'_>,
-    ) -> Result<(PathBuf, Option<SweepReport>), SweepError> {
+    ) -> Result<(PathBuf, Option<SweepReport>), Error> {
         self.shard = shard;
         let mut binding = self.binding();
-        let failed = |source| SweepError::Folder { path: folder.into(), source };
+        let failed = |source| unwritable(folder, &source);
         fs::create_dir_all(folder).map_err(failed)?;
         let file = folder.join(binding.file_name());
         let part_path = Self::part_of(&file);
         if file.exists() {
-            if Contents::read(&file)?.is_whole_of(&binding)? {
+            if Contents::read(&file).map_err(|reason| foreign(&file, reason))?.is_whole_of(&binding)? {
                 return Ok((file, None));
             }
             // Damaged: what is whole of it is kept, unless it is being solved again already.

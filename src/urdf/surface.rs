@@ -1,7 +1,7 @@
 //! Surfaces of shapes, as triangles.
 
 use super::{Geometry, Placed, UrdfError, document::Source, package};
-use crate::{object, proxy};
+use crate::{object, proxy, scene::Placement};
 use glam::DVec3;
 use std::path::Path;
 
@@ -31,7 +31,7 @@ impl Surface {
                     return Err(refuse(message.into()));
                 }
                 // Merged nodes and dropped faces change no surface.
-                let read = object::read_surface(&file, 1.0, DVec3::ZERO, &mut Vec::new());
+                let read = object::read_surface(&file, &Placement::METRES, &mut Vec::new());
                 let (mut nodes, triangles) = read.map_err(|error| refuse(error.to_string()))?;
                 nodes.iter_mut().for_each(|node| *node *= *scale);
                 let sound = triangles.as_flattened().iter().all(|&node| {

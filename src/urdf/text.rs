@@ -24,7 +24,8 @@ const TIP_FORCE: f64 = 10.0;
 /// `command`: what made it, for the head of the file.
 ///
 /// # Errors
-/// [`UrdfError::Scene`] if the text is no valid scene, a fault of this program.
+/// [`UrdfError::Request`] if there is no contact node, [`UrdfError::Scene`] if the text is no valid scene, a fault of
+/// this program.
 pub fn write_scene(
     robot: &Robot,
     arm: &Arm,
@@ -33,7 +34,11 @@ pub fn write_scene(
     command: &str,
 ) -> Result<String, UrdfError> {
     let proxy = proxy(arm, nodes);
-    let practice = Practice::new(&Chain::new(&proxy));
+    let no_nodes = || UrdfError::Request {
+        path: robot.path.clone(),
+        message: "the arm has no contact node, and could touch nothing".into(),
+    };
+    let practice = Practice::new(&Chain::new(&proxy)).ok_or_else(no_nodes)?;
     let mut text = String::new();
     // Writing to a string fails only where memory does.
     let _ = write(&mut text, robot, arm, &proxy, nodes, &practice, command);
@@ -107,8 +112,7 @@ fn write(
     entry(text, "stiffness", "200.0", "N/m, of one contact spring; each node has three")?;
 
     let Practice { press, .. } = practice;
-    let lines: Vec<String> = press.axes.iter().map(|(_, lines)| lines.to_string()).collect();
-    heading(text, &format!("C-space: {} = {} configurations", lines.join(" x "), press.points()))?;
+    heading(text, "C-space: where contact is baked")?;
     writeln!(
         text,
         "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with \
@@ -135,7 +139,7 @@ fn write_head(text: &mut String, robot: &Robot, arm: &Arm, joints: usize, comman
     writeln!(text, "#     {}", comment(command))?;
     writeln!(
         text,
-        "# against a soft ball, which is there for a start: put your own object in its place, delete\n# [grid] and [motion], and let `haptize place SCENE --write` make them anew.\n#"
+        "# against a soft ball, which is there for a start: `haptize place SCENE --mesh FILE --write` puts your own object\n# in its place, and grid and motions there.\n#"
     )?;
     writeln!(text, "# All quantities are SI: m, rad, N, kg, s. Every key is explained in datasets/README.md.")?;
     if !arm.notes.is_empty() {
@@ -206,13 +210,12 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, press: &Press)
     writeln!(
         text,
         "# One number per joint: {TIP_STIFFNESS:.0} N/m and at most {TIP_FORCE:.0} N where the arm meets the ball, \
-         through each joint's lever.\n"
+         through each joint's lever.\n# proxy_damping is left out: it is as much as the stiffness of the contact asks for.\n"
     )?;
     writeln!(text, "[haptics]")?;
     let stiffness: Vec<f64> = press.levers.iter().map(|lever| TIP_STIFFNESS * lever * lever).collect();
     let scaled = |factor: f64| list(&stiffness, |k| coarse(factor * k));
     entry(text, "boundary_slope", &scaled(0.75), "N m/rad or N/m")?;
-    entry(text, "proxy_damping", &scaled(2.5e-3), "N m s/rad or N s/m")?;
     entry(text, "coupling_stiffness", &scaled(1.0), "N m/rad or N/m")?;
     entry(text, "coupling_damping", &scaled(5e-4), "N m s/rad or N s/m")?;
     entry(text, "device_damping", &scaled(1.5e-3), "N m s/rad or N s/m")?;

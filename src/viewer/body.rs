@@ -2,9 +2,9 @@
 
 use super::{loaded::Loaded, view_renderer::Surface};
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::Status,
-    gpu::{Context, FrameError, FrameMethod, FrameUpdate, GpuError},
+    gpu::{Context, FrameMethod, FrameUpdate, GpuError},
     render::{
         graphics::{ContactForces, Smoothing},
         session::Latest,
@@ -43,7 +43,7 @@ impl Body {
     ///
     /// # Errors
     /// When the device refuses it.
-    pub fn new(context: &Arc<Context>, loaded: &Loaded, effects: &GraphicsEffects) -> Result<Option<Self>, FrameError> {
+    pub fn new(context: &Arc<Context>, loaded: &Loaded, effects: &GraphicsEffects) -> Result<Option<Self>, Error> {
         let (Some(object), Some(contact), Some(graphics)) =
             (&loaded.setup.object, &loaded.forces, &loaded.setup.scene.graphics)
         else {

@@ -165,8 +165,9 @@ impl Controls {
         };
         let mut contact = scene.contact;
         ui.horizontal(|ui| {
-            let label =
-                ui.label("Solve").on_hover_text("The law of contact: depths and directions before the surface at rest, before the deformed one, or the paper's iteration");
+            let label = ui.label("Solve").on_hover_text(
+                "The law of contact: depths and directions before the surface at rest, or before the deformed one",
+            );
             ComboBox::from_id_salt("law")
                 .width(CHOICE_WIDTH)
                 .selected_text(contact.law.name())

@@ -7,12 +7,13 @@
 
 use super::{background::spawn, guide::Guide};
 use crate::{
+    Error,
     control::{Clock, Patience, real_time},
     device::{Device, Pointer, PointerInput},
     render::{
         haptic::Haptics,
         realtime::{Ends, RATE, Recorder},
-        session::{ClearFault, Driver, Latest, SessionError},
+        session::{ClearFault, Driver, Latest, cannot_start},
         trace::Tick,
     },
     scene::HapticsSpec,
@@ -82,7 +83,7 @@ struct Body {
 }
 
 /// The haptic thread's answer before its first tick.
-type Began = Result<(Ends, ClearFault), SessionError>;
+type Began = Result<(Ends, ClearFault), Error>;
 
 /// Steps that the caller asks for.
 struct Steps {
@@ -299,7 +300,7 @@ impl Body {
         };
         let (mut recorder, ends) = Recorder::new(haptics.joints());
         let driver = Driver::new(haptics, self.device.as_mut());
-        match clock.map_err(SessionError::from).and_then(|clock| Ok((clock, driver?))) {
+        match clock.map_err(cannot_start).and_then(|clock| Ok((clock, driver?))) {
             Err(error) => drop(report.send(Err(error))),
             Ok((mut clock, mut driver)) => {
                 drop(report.send(Ok((ends, driver.controller.clear()))));

@@ -7,19 +7,16 @@ use super::{
     loaded::Loaded,
 };
 use crate::{
+    Error, ErrorKind,
     dataset::{Dataset, Surface},
     gpu::{AdapterChoice, AdapterSummary, Context, GpuError, GpuSolver},
     proxy::Chain,
     scene::Scene,
-    sweep::{
-        BackendChoice, ChosenBackend, Progress, Run, SweepError, build_object, is_worth_a_gpu, model_of, remedied,
-        sweep_of,
-    },
+    sweep::{BackendChoice, ChosenBackend, Progress, Run, build_object, is_worth_a_gpu, model_of, remedied, sweep_of},
 };
 use std::{
-    error::Error,
     fmt,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -154,7 +151,7 @@ impl Job {
             };
             let outcome = match run(task, &solver, &context, &flag, &mut progress) {
                 Ok(loaded) => JobResult::Loaded(Box::new(loaded)),
-                Err(error) if is_cancelled(error.as_ref()) => JobResult::Cancelled,
+                Err(error) if error.kind() == ErrorKind::Stopped => JobResult::Cancelled,
                 Err(error) => JobResult::Failed(remedied(&error.to_string(), ON_THE_CPU)),
             };
             let _ = sender.send(Report::Over(outcome));
@@ -208,17 +205,15 @@ impl Drop for Job {
     }
 }
 
-type Failure = Box<dyn Error + Send + Sync>;
-
 fn run(
     task: Task,
     solver: &Solver,
     context: &Arc<Context>,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
-) -> Result<(Loaded, Option<Body>), Failure> {
+) -> Result<(Loaded, Option<Body>), Error> {
     let loaded = match task {
-        Task::Open(path) if is_scene(&path) => Loaded::live(Scene::load(&path)?)?,
+        Task::Open(path) if Scene::is_at(&path) => Loaded::live(Scene::load(&path)?)?,
         Task::Open(path) => {
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
@@ -229,11 +224,6 @@ fn run(
     Ok((loaded, body))
 }
 
-/// Scenes end in .toml; everything else is taken for a dataset, whose reader says what it is not.
-fn is_scene(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
-}
-
 fn bake(
     scene: Scene,
     surface: Option<Surface>,
@@ -241,7 +231,7 @@ fn bake(
     context: &Arc<Context>,
     stop: &AtomicBool,
     progress: &mut dyn FnMut(Progress),
-) -> Result<Loaded, Failure> {
+) -> Result<Loaded, Error> {
     let object = match surface {
         Some(surface) => surface.object(&scene.object)?,
         None => build_object(&scene)?,
@@ -278,14 +268,10 @@ fn bake(
     Ok(loaded)
 }
 
-fn is_cancelled(error: &(dyn Error + 'static)) -> bool {
-    matches!(error.downcast_ref::<SweepError>(), Some(SweepError::Stopped { .. }))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{object::Object, scene::Shape};
+    use crate::{object::Object, scene::Placement, scene::Shape};
 
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
@@ -307,8 +293,8 @@ mod tests {
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let mut scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let surface = Surface::of(&Object::build(&scene.object).unwrap());
-        let (file, centre) = ("gone.obj".into(), glam::DVec3::ZERO);
-        scene.object.shape = Shape::Mesh { file, scale: 1.0, centre, refine: None };
+        let file = "gone.obj".into();
+        scene.object.shape = Shape::Mesh { file, placement: Placement::METRES, refine: None };
         scene.grid.axes.iter_mut().for_each(|axis| axis.count = 2);
         let bake = |surface| {
             let task = Task::Bake(Arc::new(scene.clone()), surface);

@@ -1,19 +1,14 @@
 //! The content of the window: a dataset with everything its rendering needs, and how it came to be.
 
 use crate::{
-    JointVector,
+    Error, JointVector,
     dataset::Dataset,
     device::Motion,
-    render::{
-        graphics::ContactForces,
-        haptic::Haptics,
-        live::LiveScene,
-        setup::{Setup, SetupError},
-    },
+    render::{graphics::ContactForces, haptic::Haptics, live::LiveScene, setup::Setup},
     scene::{HapticsSpec, Scene, Tuning},
     sweep::SweepReport,
 };
-use std::{error::Error, path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc};
 
 /// A dataset that can be felt and seen. Cheap to clone: the data are shared.
 #[derive(Clone)]
@@ -41,11 +36,11 @@ impl Loaded {
     ///
     /// # Errors
     /// When the dataset cannot be rendered.
-    pub fn new(dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, SetupError> {
+    pub fn new(dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, Error> {
         Self::of(Setup::new(&dataset)?, dataset, scene, file)
     }
 
-    fn of(setup: Setup, dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, SetupError> {
+    fn of(setup: Setup, dataset: Dataset, scene: Option<Scene>, file: Option<PathBuf>) -> Result<Self, Error> {
         let scene = scene.or_else(|| {
             let path = file.clone().unwrap_or_else(|| setup.scene.path.clone());
             Scene::of_dataset(&dataset.scene, path, &dataset.provenance.algorithm).ok()
@@ -67,7 +62,7 @@ impl Loaded {
     ///
     /// # Errors
     /// When it cannot be solved or rendered.
-    pub fn live(scene: Scene) -> Result<Self, Box<dyn Error + Send + Sync>> {
+    pub fn live(scene: Scene) -> Result<Self, Error> {
         let live = Arc::new(LiveScene::new(scene.clone())?);
         let dataset = live.dataset();
         let loaded = Self::of(Setup::live(Arc::clone(&live), &dataset)?, dataset, Some(scene), None)?;
@@ -86,7 +81,7 @@ impl Loaded {
     ///
     /// # Errors
     /// When they do not make a loop.
-    pub fn tuned(&self, gains: &HapticsSpec) -> Result<(Arc<Haptics>, Option<String>), SetupError> {
+    pub fn tuned(&self, gains: &HapticsSpec) -> Result<(Arc<Haptics>, Option<String>), Error> {
         let (haptics, advice) = self.setup.retuned(&self.dataset, gains)?;
         Ok((Arc::new(haptics), advice))
     }

@@ -61,7 +61,8 @@ pub use theme::LEAST_WINDOW;
 pub use window::open;
 
 use crate::{
-    gpu::{ADAPTER_VARIABLE, FrameError, GpuError},
+    Error,
+    gpu::{ADAPTER_VARIABLE, GpuError},
     memory,
     sweep::{OTHER_ADAPTER, remedied},
 };
@@ -97,7 +98,7 @@ pub enum ViewError {
     Lost(String),
     /// The object's frame update.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Frame(#[from] Error),
     /// Nothing answers where a desktop would.
     #[error(
         "there is no display to open a window on: start haptize in a desktop session, or draw one picture without a \

@@ -14,11 +14,12 @@ use super::{
     view_renderer::{Look, Quantity, ViewRenderer},
 };
 use crate::{
+    Error,
     draw::{
         camera::Camera,
         solid::{self, Cone},
     },
-    gpu::{Context, FrameError},
+    gpu::Context,
     proxy::{Chain, Pose},
     render::session::Latest,
     scene::GraphicsEffects,
@@ -54,7 +55,7 @@ pub struct SceneView {
     /// Shapes of the arm's links, where it has any.
     links: Option<Links>,
     /// The object with the effects that the controls have, set up in the background.
-    redrawing: Following<GraphicsEffects, Result<Option<Body>, FrameError>>,
+    redrawing: Following<GraphicsEffects, Result<Option<Body>, Error>>,
     pose: Pose,
     ghost: Pose,
     /// The parts that are shown.

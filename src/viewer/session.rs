@@ -12,11 +12,7 @@ use super::{
     slices::Slices,
     theme::{FINE_GAP, GAP, PLANE_SHARE, ROOM_FOR_BOTH},
 };
-use crate::{
-    JointVector,
-    render::{haptic::Haptics, setup::SetupError},
-    scene::HapticsSpec,
-};
+use crate::{Error, JointVector, render::haptic::Haptics, scene::HapticsSpec};
 use eframe::egui::Ui;
 use std::sync::Arc;
 
@@ -29,7 +25,7 @@ pub struct Session {
     pub lead: Option<Lead>,
     pace: TickSource,
     /// The loop with the gains that the controls have, made in the background.
-    retuning: Following<HapticsSpec, Result<Tuned, SetupError>>,
+    retuning: Following<HapticsSpec, Result<Tuned, Error>>,
     slices: Slices,
     cloud: Cloud,
     pub controls: Controls,
@@ -133,7 +129,7 @@ impl Session {
     }
 
     /// Goes on with another loop, the hand where it is.
-    fn go_on(&mut self, made: Result<Tuned, SetupError>) -> Result<(), String> {
+    fn go_on(&mut self, made: Result<Tuned, Error>) -> Result<(), String> {
         let (haptics, advice) = made.map_err(|error| error.to_string())?;
         let guide = self.feel.guide().clone();
         self.history.collect(&mut self.feel);

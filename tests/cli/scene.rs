@@ -5,7 +5,7 @@ use haptize::scene::{
     ContactLaw, ContactSurface, Diagnostic, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind,
     Material, Rendering, Scene, SceneError, Shape,
 };
-use haptize::{JointVector, MAX_JOINTS};
+use haptize::{JointVector, MAX_AXES, MAX_JOINTS};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -196,12 +196,7 @@ fn the_law_of_contact_is_named_by_its_key_or_by_a_former_one() {
         parse(&text).unwrap().contact.law
     };
     assert_eq!(law(""), ContactLaw::Rest);
-    let names = [
-        ("following", ContactLaw::Following),
-        ("energy", ContactLaw::Following),
-        ("rest", ContactLaw::Rest),
-        ("paper", ContactLaw::Paper),
-    ];
+    let names = [("following", ContactLaw::Following), ("energy", ContactLaw::Following), ("rest", ContactLaw::Rest)];
     for (name, expected) in names {
         for key in ["law", "geometry", "algorithm"] {
             assert_eq!(law(&format!("{key} = \"{name}\"")), expected);
@@ -210,7 +205,7 @@ fn the_law_of_contact_is_named_by_its_key_or_by_a_former_one() {
 }
 
 #[test]
-fn the_smooth_surface_is_touched_unless_the_scene_or_the_law_says_otherwise() {
+fn the_smooth_surface_is_touched_unless_the_scene_says_otherwise() {
     let surface = |contact: &str, node: &str| {
         let text = LEAST
             .replace("{ at = [0.1, 0, 0] }", node)
@@ -221,7 +216,6 @@ fn the_smooth_surface_is_touched_unless_the_scene_or_the_law_says_otherwise() {
     assert_eq!(surface("", point).unwrap(), ContactSurface::Smooth);
     assert_eq!(surface("", ball).unwrap(), ContactSurface::Smooth);
     assert_eq!(surface("surface = \"facets\"", point).unwrap(), ContactSurface::Facets);
-    assert_eq!(surface("law = \"paper\"", ball).unwrap(), ContactSurface::Facets);
     let refused = surface("surface = \"facets\"", ball).unwrap_err().to_string();
     assert!(refused.contains("leave surface out"), "{refused}");
 }
@@ -277,8 +271,6 @@ fn a_skin_is_told_by_what_one_knows_of_it() {
 fn interpolation_is_smooth_where_there_is_an_energy_to_interpolate() {
     let interpolation = |text: &str| parse(text).unwrap().haptics.interpolation;
     assert_eq!(interpolation(LEAST), Interpolation::Potential);
-    let paper = LEAST.replace("stiffness = 1000", "stiffness = 1000\nlaw = \"paper\"");
-    assert_eq!(interpolation(&paper), Interpolation::Linear);
     assert_eq!(interpolation(&format!("{LEAST}[haptics]\ninterpolation = \"linear\"")), Interpolation::Linear);
     let scan = Rendering::load(dataset("sponge.toml")).unwrap();
     assert_eq!(scan.haptics.interpolation, Interpolation::Linear);
@@ -321,7 +313,7 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "stiffness = \"1000\"", "stiffness = \"1000\"", &["string", "rigid"]),
     ("stiffness = 1000", "stiffness = 1000\ntolerance = 0", "tolerance = 0", &["between 0 and 1"]),
     ("stiffness = 1000", "stiffness = 1000\nmax_iterations = 0", "max_iterations", &["at least 1"]),
-    ("stiffness = 1000", "stiffness = 1000\nlaw = \"magic\"", "magic", &["`rest`", "`following`", "`paper`"]),
+    ("stiffness = 1000", "stiffness = 1000\nlaw = \"magic\"", "magic", &["`rest`", "`following`"]),
     ("stiffness = 1000", "stiffness = 1000\nupdates = 2", "updates = 2", &["linearised", "leave it out"]),
     (
         "stiffness = 1000",
@@ -331,16 +323,16 @@ const BROKEN: &[Broken] = &[
     ),
     (
         "stiffness = 1000",
-        "stiffness = 1000\nlaw = \"rest\"\nalgorithm = \"paper\"",
+        "stiffness = 1000\nlaw = \"rest\"\nalgorithm = \"following\"",
         "[contact]",
         &["duplicate", "`law`"],
     ),
     ("stiffness = 1000", "stiffness = 1000\nsurface = \"round\"", "round", &["facets", "smooth"]),
     (
         "stiffness = 1000",
-        "stiffness = 1000\nlaw = \"paper\"\nsurface = \"smooth\"",
-        "smooth",
-        &["defined on the triangles", "leave out"],
+        "stiffness = 1000\nlaw = \"paper\"",
+        "law = \"paper\"",
+        &["no law of a scene", "`haptize paper`", "leave law out"],
     ),
     ("stiffness = 1000", "", "[contact]", &["no stiffness", "stiffness_per_length"]),
     ("stiffness = 1000", "stiffness_per_length = 1e5", "per_length = 1e5", &["{ at = .. }", "of each node instead"]),
@@ -502,11 +494,18 @@ fn long_lines_and_control_characters_do_not_reach_the_terminal() {
 }
 
 #[test]
-fn the_number_of_joints_is_one_to_six() {
+fn the_number_of_joints_is_one_to_twelve_and_six_with_a_grid() {
     let joint = "[[proxy.joint]]\nkind = \"revolute\"\naxis = [0, 0, 1]\nlimits = [0, 0.5]\n";
-    let with = |extra: usize| parse(&LEAST.replace("[contact]", &format!("{}[contact]", joint.repeat(extra))));
-    assert_eq!(with(5).unwrap().proxy.joints.len(), MAX_JOINTS);
-    assert!(with(6).unwrap_err().to_string().contains("7 joints: it must have 1 to 6"));
+    let arm = |extra: usize| LEAST.replace("[contact]", &format!("{}[contact]", joint.repeat(extra)));
+    assert_eq!(parse(&arm(5)).unwrap().proxy.joints.len(), MAX_AXES);
+    let refused = parse(&arm(6)).unwrap_err().to_string();
+    assert!(
+        refused.contains("at most 6 axes, and the arm has 7 joints") && refused.contains("haptize play"),
+        "{refused}"
+    );
+    let free = |extra: usize| parse(&arm(extra).replace("[grid]\nspacing = 0.1", ""));
+    assert_eq!(free(11).unwrap().proxy.joints.len(), MAX_JOINTS);
+    assert!(free(12).unwrap_err().to_string().contains("13 joints: it must have 1 to 12"));
     let none = LEAST.replace("[[proxy.joint]]", "[proxy]\njoint = []\n[unused]");
     assert!(parse(&none).is_err());
     let empty = "[proxy]\njoint = []\n".to_owned();

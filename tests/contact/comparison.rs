@@ -1,9 +1,10 @@
-//! The three laws beside each other.
+//! The two laws and the paper's iteration beside each other.
 
-use crate::fixture::{SPHERE_CENTRE, arm, contact, probe, random_configurations, spec, sphere};
+use crate::fixture::{SPHERE_CENTRE, arm, contact, models, probe, random_configurations, searches, spec, sphere};
 use crate::oracle::check_account;
 use haptize::contact::{Equilibrium, Model, Solver, Status};
 use haptize::object::Object;
+use haptize::paper::PaperSolver;
 use haptize::proxy::Chain;
 use haptize::scene::{ContactLaw, Shape, SpringKind};
 
@@ -41,9 +42,8 @@ fn the_papers_iteration_is_close_to_the_energy_form_at_soft_contact() {
     for segments in [10, 20] {
         let shape = Shape::Sphere { centre: SPHERE_CENTRE, radius: 0.05, rings: segments, segments };
         let object = Object::build(&spec(shape, SpringKind::Isotropic)).unwrap();
-        let paper = Model::new(&object, &chain, contact(ContactLaw::Paper, 1.0));
         let energy = Model::new(&object, &chain, contact(ContactLaw::Following, 1.0));
-        let (mut paper, mut energy) = (Solver::new(&paper), Solver::new(&energy));
+        let (mut paper, mut energy) = (PaperSolver::new(&energy), Solver::new(&energy));
         let mut differences = Vec::new();
         for q in random_configurations(7, 200) {
             let (paper, energy) = (paper.solve(&q), energy.solve(&q));
@@ -72,8 +72,8 @@ fn the_papers_iteration_says_when_it_has_lost_contact() {
     let configurations = random_configurations(8, 150);
     let mut shares = Vec::new();
     for stiffness in [100.0, 300.0, 3e3, 3e4] {
-        let model = Model::new(&object, &chain, contact(ContactLaw::Paper, stiffness));
-        let mut solver = Solver::new(&model);
+        let model = Model::new(&object, &chain, contact(ContactLaw::Following, stiffness));
+        let mut solver = PaperSolver::new(&model);
         let (mut touching, mut converged) = (0, 0);
         for q in &configurations {
             let equilibrium = solver.solve(q);
@@ -132,8 +132,9 @@ fn contact_at_rest_obeys_its_law_at_every_node() {
 fn a_node_at_the_centre_ends() {
     let object = sphere(SpringKind::Isotropic);
     let chain = probe(SPHERE_CENTRE, glam::DVec3::Z);
-    for law in [ContactLaw::Following, ContactLaw::Rest, ContactLaw::Paper] {
-        let equilibrium = solve(&object, &chain, law, 500.0, &[0.0]);
+    let models = models(&object, &chain, 500.0);
+    for mut solve in searches(&models) {
+        let equilibrium = solve(&[0.0]);
         assert_ne!(equilibrium.status, Status::Free);
         assert!(equilibrium.energy.is_finite() && equilibrium.torque.is_finite());
     }

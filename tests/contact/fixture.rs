@@ -1,7 +1,9 @@
 //! Objects, proxies and configurations that the tests share, made of those of the hard cases.
 
 use glam::DVec3;
+use haptize::contact::{Equilibrium, Model, Solver};
 pub use haptize::fixtures::Random;
+use haptize::paper::PaperSolver;
 use haptize::{
     fixtures::bodies::{self, Ball, PAPER, joint},
     object::Object,
@@ -93,6 +95,21 @@ pub fn ball(from: DVec3, axis: DVec3, radius: f64) -> Chain {
 /// Contact springs Kc (N/m), and few iterations: what converges here does so soon.
 pub fn contact(law: ContactLaw, stiffness: f64) -> ContactSpec {
     ContactSpec { law, max_iterations: 100, ..bodies::contact(stiffness) }
+}
+
+/// What solves configurations, by a law or by the paper's iteration.
+pub type Search<'a> = Box<dyn FnMut(&[f64]) -> Equilibrium + 'a>;
+
+/// The models of the two laws at contact stiffness Kc (N/m).
+pub fn models<'a>(object: &'a Object, chain: &'a Chain, stiffness: f64) -> [Model<'a>; 2] {
+    [ContactLaw::Following, ContactLaw::Rest].map(|law| Model::new(object, chain, contact(law, stiffness)))
+}
+
+/// All that solves one configuration: the laws of `models`, and the paper's iteration.
+pub fn searches<'a>(models: &'a [Model<'a>; 2]) -> [Search<'a>; 3] {
+    let [mut following, mut rest] = models.each_ref().map(Solver::new);
+    let mut paper = PaperSolver::new(&models[0]);
+    [Box::new(move |q| following.solve(q)), Box::new(move |q| rest.solve(q)), Box::new(move |q| paper.solve(q))]
 }
 
 /// Joint coordinates of [`arm`] at random, about a third of them in contact with the sphere.

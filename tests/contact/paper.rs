@@ -3,12 +3,12 @@ use haptize::{
     dataset::Dataset,
     device::Motion,
     gridize::{GridizeOptions, Interpolation, gridize},
+    paper::{Comparison, Row, Scanned, Scans, Sphere, Value, baked, procedure, specimen},
     proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
-    report::paper::{Comparison, Row, Scanned, Scans, Sphere, Value, procedure, specimen},
     scan::{LogHeader, LogWriter, Plan, ScanLog, Session, labels, simulated::SimulatedRig},
-    scene::{ContactLaw, PlanSpec, ScanScene, Scene, Waypoint},
-    sweep::{SweepReport, baked},
+    scene::{PlanSpec, ScanScene, Scene, Waypoint},
+    sweep::SweepReport,
 };
 use std::sync::atomic::AtomicBool;
 
@@ -28,9 +28,9 @@ fn felt(dataset: &Dataset, motion: impl Fn(&Setup) -> &[Waypoint]) -> (Setup, Tr
 #[test]
 fn the_papers_iteration_converges_for_95_percent_of_the_contacts_and_the_press_meets_no_failure() {
     let mut scene = paper();
-    assert_eq!(scene.contact.law, ContactLaw::Paper);
     let share = |report: &SweepReport| 1.0 - report.unconverged as f64 / report.contact_points as f64;
     let (dataset, report) = baked(&scene).unwrap();
+    assert_eq!(dataset.provenance.algorithm, "paper");
     assert!(report.contact_points > 4000 && share(&report) >= 0.95, "{report:?}");
 
     for (name, several) in [("press", 5), ("scrape", 3)] {

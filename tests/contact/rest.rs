@@ -49,22 +49,26 @@ fn solid() -> Object {
     Object::build(&spec).unwrap()
 }
 
-fn samples() -> Vec<Sample> {
+/// Bodies of every kind before an arm, each with as many random configurations.
+fn bodies_of_all_kinds(count: usize) -> [Sample; 4] {
     let of = |name, object, radius| Sample {
         name,
         object,
         chain: Chain::new(&arm(radius)),
-        places: random_configurations(7, 24),
+        places: random_configurations(7, count),
     };
-    vec![
+    [
         of("springs", sphere(SpringKind::Isotropic), 0.0),
         of("springs along their length, balls", sphere(SpringKind::Axial), 0.008),
         of("torus", torus(), 0.0),
         of("solid", solid(), 0.0),
-        shipped("mesh", 60),
-        shipped("touch", 8000),
-        shipped("organ", 200),
     ]
+}
+
+fn samples() -> Vec<Sample> {
+    let mut samples = Vec::from(bodies_of_all_kinds(24));
+    samples.extend([shipped("mesh", 60), shipped("touch", 8000), shipped("organ", 200)]);
+    samples
 }
 
 /// Proxy nodes that push, with the object's nodes that they push on.
@@ -181,7 +185,10 @@ const ALONG: f64 = 1e-5;
 /// smooth across: the tangent is that of one side, and along the edge the derivative of the torque.
 #[test]
 fn the_tangent_holds_along_an_edge_that_the_closest_point_lies_on() {
-    let Sample { object, chain, .. } = shipped("touch", 0);
+    // A ball of rings, which has such edges: the joints turn in a plane through its poles.
+    let text = include_str!("../../datasets/touch.toml").replace("subdivisions = 3", "edge = 0.006");
+    let scene = Scene::parse(&text, "touch.toml").unwrap();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
     let mut model = Model::new(&object, &chain, contact(1e3));
     model.with_tangent = true;
     let mut solver = Solver::new(&model);
@@ -310,6 +317,51 @@ fn every_configuration_has_its_equilibrium_within_few_steps() {
             assert!(most <= 40 && touching > 8 && residual < 1e-12, "{kc} N/m: {most} {touching} {residual}");
         }
     }
+}
+
+/// Solves `count` random configurations of bodies of every kind, of shipped scenes and of a bar that is pressed as deep as
+/// a body's middle, with contact from soft to rigid.
+fn solve_at_random(count: usize) {
+    const STIFFNESSES: [f64; 8] = [10.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
+    let each = count / (11 * STIFFNESSES.len());
+    let mut samples = Vec::from(bodies_of_all_kinds(each));
+    samples.extend(["sphere", "mesh", "touch", "organ", "woodenhaptics"].map(|name| shipped(name, each)));
+    for (name, radius) in [("bar", 0.0), ("bar of balls", 0.004)] {
+        let (object, chain) = (bodies::sphere(PAPER).unwrap(), bodies::floating_bar(radius));
+        let model = Model::new(&object, &chain, contact(1e3));
+        let places = bodies::pressed(&model, 37, each, 0.0, 0.05).into_iter().map(|q| q.to_vec()).collect();
+        drop(model);
+        samples.push(Sample { name, object, chain, places });
+    }
+    let (mut solved, mut in_contact, mut most, mut residual) = (0, 0, 0, 0.0_f64);
+    for Sample { name, object, chain, places } in samples {
+        let places: Vec<JointVector> = places.iter().map(|q| JointVector::from_slice(q)).collect();
+        let mut model = Model::new(&object, &chain, contact(1.0));
+        for kc in STIFFNESSES {
+            model.set_stiffness(kc / 3.0);
+            for (q, found) in places.iter().zip(CpuBackend::new(&model, 0).unwrap().solve(&places).unwrap()) {
+                assert!(matches!(found.status, Status::Free | Status::Contact), "{name}, {kc} N/m, {q:?}: {found:?}");
+                assert!(found.energy >= 0.0 && found.torque.is_finite(), "{name}, {kc} N/m, {q:?}");
+                solved += 1;
+                in_contact += usize::from(found.status == Status::Contact);
+                (most, residual) = (most.max(found.iterations), residual.max(found.residual));
+            }
+        }
+    }
+    println!("{solved} solved, {in_contact} in contact: at most {most} steps, residual {residual:.1e}");
+    assert!(solved * 10 > count * 9 && in_contact * 4 > solved, "{solved} {in_contact}");
+    assert!(most <= 60 && residual < 1e-11, "{most} {residual}");
+}
+
+#[test]
+fn random_configurations_are_solved_in_few_steps() {
+    solve_at_random(10_000);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn a_hundred_thousand_random_configurations_are_solved_in_few_steps() {
+    solve_at_random(110_000);
 }
 
 /// At the depths of the shipped scenes both laws agree, the better the shallower: of the torque, rms over rms.

@@ -8,9 +8,9 @@ use crate::common::{
 use assert_no_alloc::assert_no_alloc;
 use haptize::{
     JointVector, MAX_JOINTS,
-    control::{Clock, ClockError, LONGEST_ARREARS, Patience},
+    control::{Clock, LONGEST_ARREARS, Patience},
     dataset::Dataset,
-    device::{Applied, Device, Halt, HandError, Motion, Pointer, Reading, Scheduler, SimulatedHand},
+    device::{Applied, Device, Halt, Motion, Pointer, Reading, Scheduler, SimulatedHand},
     field::TorqueField,
     fixtures::grids::{grid, half_space},
     render::{
@@ -157,7 +157,6 @@ fn a_maker_s_library_that_calls_at_another_rate_is_refused_and_the_last_torque_o
     let always = || Some(Patience::Spins);
     for other in [0.5 * rate, 2.0 * rate, 1.001 * rate] {
         let refused = Clock::of(&called(other, &last), haptics.period(), RATE, &always).err().unwrap();
-        assert!(matches!(refused, ClockError::Rate { device, .. } if device == other), "{refused}");
         assert!(refused.to_string().contains(&format!("rate = {other} in [haptics]")), "{refused}");
         let mut device = called(other, &last);
         let plan = Plan::new(Vec::new(), haptics.period(), 0.1, 0);
@@ -276,11 +275,11 @@ fn a_place_that_is_none_is_refused_and_the_hand_keeps_its_goal() {
     let (mut device, mut pointer) = Pointer::new(&haptics(2), &start).unwrap();
     for place in [&[f64::NAN, 0.0][..], &[0.0, f64::INFINITY], &[0.0, -1e300]] {
         let place = JointVector::from_slice(place);
-        assert!(matches!(pointer.move_to(&place), Err(HandError::Place(_))));
-        assert!(matches!(Pointer::new(&haptics(2), &place), Err(HandError::Place(_))));
+        assert!(pointer.move_to(&place).unwrap_err().to_string().contains("no place for a hand"));
+        assert!(Pointer::new(&haptics(2), &place).is_err());
     }
     let other = JointVector::zeros(3);
-    assert_eq!(pointer.move_to(&other), Err(HandError::Joints { told: 3, device: 2 }));
+    assert!(pointer.move_to(&other).unwrap_err().to_string().contains("told 3 joints and the haptic device has 2"));
     assert!(Pointer::new(&haptics(2), &other).is_err());
     assert_eq!(device.read(1e-3).hand, start);
 }

@@ -2,8 +2,9 @@
 
 use crate::fixture::peak;
 use haptize::{
+    Error, ErrorKind,
     contact::Status,
-    dataset::{Axis, Contacts, Dataset, Error, Format, Grid, Provenance, SlipColumns, Solid, Surface},
+    dataset::{Axis, Contacts, Dataset, Format, Grid, Provenance, SlipColumns, Solid, Surface},
 };
 use std::{
     fs::{File, OpenOptions},
@@ -237,11 +238,11 @@ fn a_file_cut_anywhere_or_grown_is_refused() {
 #[test]
 fn files_that_are_none_are_refused_by_name() {
     let folder = Folder::new();
-    assert!(matches!(refusal(&folder.file("missing")), Some(Error::Read { .. })));
-    assert!(matches!(refusal(folder.0.path()), Some(Error::Read { .. })));
-    assert!(matches!(refusal(&folder.written(b"name = \"a scene\"\n")), Some(Error::Foreign { .. })));
+    assert_eq!(refusal(&folder.file("missing")).map(|error| error.kind()), Some(ErrorKind::File));
+    assert_eq!(refusal(folder.0.path()).map(|error| error.kind()), Some(ErrorKind::File));
+    assert_eq!(refusal(&folder.written(b"name = \"a scene\"\n")).map(|error| error.kind()), Some(ErrorKind::Foreign));
     #[cfg(unix)]
-    assert!(matches!(refusal(Path::new("/dev/zero")), Some(Error::Read { .. })));
+    assert_eq!(refusal(Path::new("/dev/zero")).map(|error| error.kind()), Some(ErrorKind::File));
 }
 
 /// A file with its header's JSON and its data changed, and lengths and checksum right again.
@@ -420,7 +421,7 @@ fn hostile_header_lengths_allocate_nothing() {
         forged[..8].copy_from_slice(&length.to_le_bytes());
         let path = folder.written(&forged);
         let (refusal, held) = peak(|| refusal(&path));
-        assert!(matches!(refusal, Some(Error::Damaged { .. })), "{length}");
+        assert_eq!(refusal.map(|error| error.kind()), Some(ErrorKind::Dataset), "{length}");
         assert!(held < 4 << 20, "{length}: {held} bytes");
     }
 }
@@ -438,10 +439,10 @@ fn a_dataset_that_contradicts_itself_is_not_written() {
         Dataset { grid: Grid { axes: vec![] }, ..sample() },
     ];
     for dataset in wrong {
-        assert!(matches!(dataset.save(&path), Err(Error::Inconsistent { .. })));
+        assert!(dataset.save(&path).unwrap_err().to_string().contains("contradicts itself"));
     }
     assert_eq!(std::fs::read(&path).unwrap(), before);
-    assert!(matches!(sample().save(&folder.file("no/such/folder/a")), Err(Error::Write { .. })));
+    assert_eq!(sample().save(&folder.file("no/such/folder/a")).unwrap_err().kind(), ErrorKind::File);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use haptize::{
     dataset::Dataset,
     object::Object,
     proxy::Chain,
-    sweep::{Run, SweepError, WithFallback},
+    sweep::{Run, WithFallback},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -31,7 +31,7 @@ fn a_file_of_another_kind_is_not_replaced() {
     let folder = Folder::new();
     std::fs::write(folder.output(), "a thesis").unwrap();
     let error = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX).unwrap_err();
-    assert!(matches!(error, SweepError::Output(_)) && error.to_string().contains("not a dataset"), "{error}");
+    assert!(error.to_string().contains("not a dataset"), "{error}");
     assert_eq!(
         (std::fs::read(folder.output()).unwrap(), folder.names()),
         (b"a thesis".to_vec(), vec!["a.haptize".into()])
@@ -44,10 +44,7 @@ fn what_another_process_writes_or_a_link_leads_to_is_left_alone() {
     let begin = || bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX);
     let claim = haptize::dataset::Claim::new(&folder.output()).unwrap().unwrap();
     let error = begin().unwrap_err();
-    assert!(
-        matches!(error, SweepError::Busy { .. }) && error.to_string().contains("another process is writing"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("another process is writing"), "{error}");
     drop(claim);
     #[cfg(unix)]
     {
@@ -55,7 +52,7 @@ fn what_another_process_writes_or_a_link_leads_to_is_left_alone() {
         std::fs::write(&target, "").unwrap();
         std::os::unix::fs::symlink(&target, folder.part()).unwrap();
         let error = begin().unwrap_err();
-        assert!(matches!(error, SweepError::ForeignPart { .. }) && error.to_string().contains("a link"), "{error}");
+        assert!(error.to_string().contains("cannot be continued: it is a link"), "{error}");
         assert_eq!(std::fs::read(&target).unwrap(), b"");
         std::fs::remove_file(folder.part()).unwrap();
     }
@@ -89,7 +86,7 @@ fn a_sweep_whose_device_is_lost_goes_on_with_the_cpu() {
 
     // Two chunks are with the CPU while the one before them is kept.
     let stopped = bake(&sweep(), &mut lossy(), &folder.output(), false, 10, 40).unwrap_err();
-    assert!(matches!(stopped, SweepError::Stopped { done: 60, .. }), "{stopped}");
+    assert!(stopped.to_string().starts_with("stopped after 60 of"), "{stopped}");
     bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap();
     let resumed = Dataset::open(&folder.output()).unwrap().provenance.notices;
     assert_eq!(&resumed[..], [part.as_str(), notice.as_str(), "from grid point 60 on: resumed on cpu (none)"]);
@@ -101,10 +98,9 @@ fn a_folder_that_cannot_be_written_is_named_at_once() {
     let mut backend = MadeUp::default();
     let missing = folder.0.path().join("none").join("a.haptize");
     let error = bake(&sweep(), &mut backend, &missing, false, 10, usize::MAX).unwrap_err();
-    assert!(matches!(error, SweepError::Folder { .. }), "{error}");
     assert!(error.to_string().contains("make the folder"), "{error}");
     let error = bake(&sweep(), &mut backend, folder.0.path(), false, 10, usize::MAX).unwrap_err();
-    assert!(matches!(error, SweepError::IsFolder { .. }), "{error}");
+    assert!(error.to_string().contains("is a folder"), "{error}");
     assert_eq!((backend.solved, folder.names()), (0, Vec::new()));
 }
 
@@ -131,8 +127,7 @@ fn a_dataset_that_cannot_be_put_in_place_stays_in_its_part() {
     };
     let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut progress };
     let error = sweep().bake(&mut MadeUp::default(), &folder.output(), false, run).unwrap_err();
-    assert!(matches!(error, SweepError::Dataset { .. }), "{error}");
-    assert!(error.to_string().contains("--resume"), "{error}");
+    assert!(error.to_string().contains("all points are kept") && error.to_string().contains("--resume"), "{error}");
     assert_eq!(folder.names(), ["a.haptize", "a.haptize.part"], "no other file is left");
     std::fs::remove_dir(folder.output()).unwrap();
     let mut idle = MadeUp::default();

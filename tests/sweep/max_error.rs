@@ -10,7 +10,7 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::Scene,
-    sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot, PilotError},
+    sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot},
 };
 use serde_json::Value;
 use std::{path::Path, sync::atomic::AtomicBool};
@@ -178,7 +178,7 @@ fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
     let pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
     let choice = pilot.choose(&scene, usize::MAX, BackendChoice::Cpu).unwrap();
     assert!(pilot.prospects.iter().all(|prospect| prospect.points >= pilot.prospects[0].points));
-    assert!(matches!(pilot.choose(&scene, 10, BackendChoice::Cpu), Err(PilotError::OutOfReach(_))));
+    assert!(pilot.choose(&scene, 10, BackendChoice::Cpu).is_err());
     let bake = haptize::sweep::Bake {
         scene: &choice.scene,
         backend: BackendChoice::Cpu,
@@ -291,16 +291,4 @@ fn a_scene_is_refined_for_potential_whatever_its_interpolation() {
     };
     let [linear, potential] = ["linear", "potential"].map(refined);
     assert_eq!(linear, potential);
-}
-
-#[test]
-fn what_no_refined_bake_can_do_is_refused_before_anything_is_written() {
-    let folder = Folder::new();
-    let path = folder.0.path();
-    std::fs::write(path.join("a.toml"), SCENE).unwrap();
-    std::fs::write(path.join("paper.toml"), SCENE.replace("[contact]\n", "[contact]\nlaw = \"paper\"\n")).unwrap();
-    let output = haptize(path, &["bake", "paper.toml", "--max-error", "5%", "--refine", "2"]);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.code() == Some(1) && told.contains("leave law out"), "{told}");
-    assert_eq!(folder.names(), ["a.toml", "paper.toml"]);
 }

@@ -1,10 +1,7 @@
 //! Memory is stated beforehand, and does not grow with the grid where results go to a file.
 
 use crate::fixture::{Folder, MadeUp, POINTS, SCENE, bake, peak, scene, sweep, sweep_of};
-use haptize::{
-    scene::Scene,
-    sweep::{Run, SweepError},
-};
+use haptize::{scene::Scene, sweep::Run};
 use std::sync::atomic::AtomicBool;
 
 /// [`scene`] with other numbers of grid lines.
@@ -79,6 +76,6 @@ fn a_grid_that_no_memory_holds_is_refused_at_once() {
     scene.grid.axes[1].step = 1e-9;
     let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut |_| () };
     let error = sweep_of(&scene, "none", "").run(&mut MadeUp::default(), run).map(drop).unwrap_err();
-    assert!(matches!(error, SweepError::Memory { .. } | SweepError::Shortage { .. }), "{error}");
+    assert!(error.to_string().contains("haptize into a file"), "{error}");
     assert!(error.to_string().contains("MB of memory") && error.to_string().contains("into a file"), "{error}");
 }

@@ -44,7 +44,7 @@ nodes = [{ at = [0.1, 0, 0] }, { at = [0.2, 0, 0], radius = 0.005 }]
 
 fn placed(text: &str, at: Option<DVec3>) -> (Scene, Placing) {
     let scene = Scene::parse(text, "own.toml").unwrap();
-    let placing = Placing::new(&scene, at).unwrap();
+    let placing = Placing::new(&scene, at).unwrap().unwrap();
     (scene, placing)
 }
 
@@ -101,18 +101,26 @@ fn a_scene_that_place_completes_keeps_its_comments_bakes_and_presses() {
     let baked = run(&["bake", "a.toml", "--backend", "cpu"]);
     let report: Value = serde_json::from_slice(&baked.stdout).unwrap();
     assert!(baked.status.success() && report["contact_points"].as_u64() > Some(100), "{report}");
-    let played = run(&["play", "a.haptize"]);
-    let report: Value = serde_json::from_slice(&played.stdout).unwrap();
-    assert!(played.status.success() && report["contact_share"].as_f64() > Some(0.2), "{report}");
+    for motion in ["press", "scrape"] {
+        let played = run(&["play", "a.haptize", "--motion", motion]);
+        let report: Value = serde_json::from_slice(&played.stdout).unwrap();
+        assert!(played.status.success() && report["contact_share"].as_f64() > Some(0.2), "{motion}: {report}");
+    }
+    // Written again, grid and motions stand in the place of those before.
+    assert!(run(&["place", "a.toml", "--write"]).status.success());
+    assert_eq!(std::fs::read_to_string(path.join("a.toml")).unwrap(), text);
 
     for (arguments, expected) in [
-        (&["place", "a.toml", "--write"][..], "has a [grid] or a [motion] already"),
-        (&["place", "a.toml", "--at", "1,2"], "three finite numbers"),
+        (&["place", "a.toml", "--at", "1,2"][..], "three finite numbers"),
         (&["place", "a.toml", "--at", "0,0,inf"], "three finite numbers"),
+        (&["place", "a.toml", "--mesh", "gone.obj"], "gone.obj"),
+        (&["place", "a.toml", "--mesh", "a.toml"], "a.toml"),
+        (&["place", "a.toml", "--turn", "0,0,1"], "--mesh"),
+        (&["place", "a.toml", "--mesh", "gone.obj", "--young", "-1"], "positive number of pascals"),
         (&["place", "a.haptize"], "a.haptize"),
     ] {
         let refused = run(arguments);
-        assert_eq!(refused.status.code(), Some(1));
+        assert!(!refused.status.success(), "{arguments:?}");
         assert!(String::from_utf8_lossy(&refused.stderr).contains(expected), "{arguments:?}: {refused:?}");
     }
     std::fs::write(path.join("far.toml"), SCENE.replace("[0.3, 0.1, 0.05]", "[0.9, 0.1, 0.05]")).unwrap();
@@ -120,4 +128,54 @@ fn a_scene_that_place_completes_keeps_its_comments_bakes_and_presses() {
     let report: Value = serde_json::from_slice(&refused.stdout).unwrap();
     assert!(refused.status.code() == Some(1) && report["refusal"].as_str().unwrap().contains("centre = "), "{report}");
     assert!(!std::fs::read_to_string(path.join("far.toml")).unwrap().contains("[grid]"), "nothing is written");
+}
+
+/// A body in millimetres, far from the origin, before an arm of which nothing is known: what an engineer brings.
+#[test]
+fn a_mesh_of_ones_own_is_put_before_the_arm_and_felt() {
+    let folder = Folder::new();
+    let path = folder.0.path();
+    let mut mesh = String::new();
+    for line in include_str!("../../datasets/organ.obj").lines() {
+        let numbers: Vec<f64> = line.split(' ').skip(1).filter_map(|number| number.parse().ok()).collect();
+        match numbers[..] {
+            [x, y, z] if line.starts_with("v ") => mesh += &format!("v {} {} {}\n", x + 400.0, y - 170.0, z + 1022.0),
+            _ => mesh += &format!("{line}\n"),
+        }
+    }
+    std::fs::write(path.join("organ.obj"), mesh).unwrap();
+    let (grid, motion) = (
+        "[grid]\nspacing = 0.1\naxes = [{ start = 0.0, count = 2 }, { start = 0.0, count = 2 }, { start = 0.0, count = 2 }]\n",
+        "# ---- Motions\n\n[motion]\n",
+    );
+    std::fs::write(path.join("a.toml"), format!("{SCENE}\n{grid}\n{motion}")).unwrap();
+    let run = |arguments: &[&str]| {
+        let output = command(path, arguments).arg("--json").output().unwrap();
+        assert!(output.status.success(), "{arguments:?}: {}", message(&output));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let turn = ["--turn", "0,0,1.5707963", "--young", "4000"];
+    let report = run(&[&["place", "a.toml", "--mesh", "organ.obj", "--write"][..], &turn].concat());
+    // As long along y now as it was along x, 120 mm.
+    let [low, high] = [0, 1].map(|end| report["body"][end][1].as_f64().unwrap());
+    assert!((high - low - 0.12).abs() < 1e-3, "{report}");
+    assert!((report["gap"].as_f64().unwrap() / report["standoff"].as_f64().unwrap() - 1.0).abs() < 0.5, "{report}");
+    let text = std::fs::read_to_string(path.join("a.toml")).unwrap();
+    for kept in ["# My own arm.", "# ---- Motions", "young = 4000.0", "scale = 0.001"] {
+        assert!(text.contains(kept), "{kept}: {text}");
+    }
+    assert!(!text.contains("as I like it"), "the object before is gone");
+    for motion in ["press", "scrape"] {
+        let report = run(&["play", "a.toml", "--motion", motion, "-o", motion]);
+        assert!(report["contact_share"].as_f64() > Some(0.3), "{motion}: {report}");
+        let bounds = report["bounds"].as_array().unwrap().iter();
+        let exceeded = bounds.filter(|bound| bound["value"].as_f64() > bound["safe"].as_f64());
+        assert_eq!(exceeded.count(), 0, "{report}");
+    }
+    // Moved away, and moved back before the tip.
+    let far = text.replace("[proxy]", "").replace("young = 4000.0", "young = 4000.0 # mine");
+    std::fs::write(path.join("a.toml"), far).unwrap();
+    let again = run(&["place", "a.toml", "--move", "--write"]);
+    assert_eq!(again["point"], report["point"]);
+    assert!(std::fs::read_to_string(path.join("a.toml")).unwrap().contains("# mine"));
 }

@@ -1,9 +1,6 @@
 //! Where contact is, against what the geometry says.
 
-use haptize::{
-    scene::Scene,
-    sweep::{Reach, ReachError},
-};
+use haptize::{Error, ErrorKind, scene::Scene, sweep::Reach};
 use std::sync::atomic::AtomicBool;
 
 /// A ball of 10 mm on two slides before a sphere of 50 mm: one pushes it against the sphere's side, one lifts it past.
@@ -30,7 +27,7 @@ nodes = [{ at = [0.06, 0, 0], radius = 0.01 }]
 /// How far the polyhedron is inside of the sphere, and a range's margin beyond contact (m).
 const SLACK: f64 = 0.004;
 
-fn reach(depth: f64) -> Result<Reach, ReachError> {
+fn reach(depth: f64) -> Result<Reach, Error> {
     Reach::new(&Scene::parse(SCENE, "ball.toml").unwrap(), Some(depth), &AtomicBool::new(false))
 }
 
@@ -87,7 +84,7 @@ fn depth_sets_the_range_and_no_contact_is_refused() {
     let refused = Reach::new(&Scene::parse(&free, "free.toml").unwrap(), None, &AtomicBool::new(false)).unwrap_err();
     assert!(refused.to_string().contains("widen the limits"), "{refused}");
     let stopped = Reach::new(&Scene::parse(SCENE, "ball.toml").unwrap(), None, &AtomicBool::new(true)).unwrap_err();
-    assert!(matches!(stopped, ReachError::Stopped));
+    assert_eq!(stopped.kind(), ErrorKind::Stopped);
 }
 
 #[test]

@@ -10,7 +10,7 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::{ContactLaw, ContactSpec, JointKind, LEVER_ARM, Scene},
-    sweep::{BackendChoice, Bake, CpuBackend, FreeSpace, Run, Sweep},
+    sweep::{Backend, BackendChoice, Bake, CpuBackend, FreeSpace, Run, Sweep},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -272,4 +272,37 @@ fn forces_are_stored_only_for_a_scene_with_graphics() {
     let blind = Scene::parse(&SCENE.replace("graphics = {}", "graphics = false"), "small.toml").unwrap();
     assert!(run(&scene()).contacts.is_some());
     assert!(run(&blind).contacts.is_none());
+}
+
+/// A backend of so many threads, which keeps the sizes of its batches.
+struct Threaded {
+    threads: usize,
+    batches: Vec<usize>,
+}
+
+impl Backend for Threaded {
+    type Error = std::convert::Infallible;
+
+    fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error> {
+        self.batches.push(configurations.len());
+        Ok(configurations.iter().map(|q| answer(q)).collect())
+    }
+
+    fn threads(&self) -> usize {
+        self.threads
+    }
+}
+
+#[test]
+fn the_least_batch_leaves_no_thread_of_the_backend_idle_whatever_the_machine_has() {
+    let first = |threads: usize| {
+        let mut backend = Threaded { threads, batches: Vec::new() };
+        bake(&sweep(), &mut backend, &Folder::new().output(), false, POINTS, usize::MAX).unwrap();
+        backend.batches[0]
+    };
+    assert_eq!(first(3), 3 * first(1));
+    let scene = scene();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let model = Model::new(&object, &chain, scene.contact);
+    assert_eq!(CpuBackend::new(&model, 3).unwrap().threads(), 3);
 }

@@ -4,7 +4,7 @@ use crate::fixture::{Folder, MadeUp, POINTS, SCENE, bake, scene, stopped_after, 
 use haptize::{
     object::Object,
     scene::Scene,
-    sweep::{Run, Sweep, SweepError},
+    sweep::{Run, Sweep},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -53,7 +53,7 @@ fn a_part_cut_or_altered_anywhere_costs_work_but_never_a_wrong_number() {
         altered[at] ^= 1 << (at % 8);
         match resumed(&altered) {
             Ok(_) => assert!(std::fs::read(folder.output()).unwrap() == whole, "byte {at} altered"),
-            Err(error) => assert!(matches!(error, SweepError::ForeignPart { .. }), "byte {at}: {error}"),
+            Err(error) => assert!(error.to_string().contains("cannot be continued"), "byte {at}: {error}"),
         }
     }
     assert_eq!(resumed(&part).unwrap().resumed_points, 6);
@@ -69,10 +69,8 @@ fn a_part_of_another_sweep_is_refused_with_the_difference() {
     let refused = |sweep: &Sweep| {
         let error = bake(sweep, &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX).unwrap_err();
         assert!(error.to_string().contains("a.haptize.part"), "{error}");
-        match error {
-            SweepError::OtherPart { difference, .. } => difference,
-            other => panic!("{other}"),
-        }
+        let text = error.to_string();
+        text.split_once("it was begun with ").unwrap().1.split_once(';').unwrap().0.to_owned()
     };
     let date = "2012-03-04T00:00:00Z";
     let changed = |from: &str, to: &str| Scene::parse(&SCENE.replace(from, to), "small.toml").unwrap();
@@ -85,10 +83,10 @@ fn a_part_of_another_sweep_is_refused_with_the_difference() {
     // The same scene, but what it names is not what it was: an inner node of a mesh moved, say.
     let other = Object::build(&changed("stiffness = 300.0", "stiffness = 300.1").object).unwrap();
     let elsewhere = Sweep::new(&scene(), &other, "cpu", "none", date).unwrap();
-    assert_eq!(refused(&elsewhere), "another object, such as a mesh that changed meanwhile");
-    let mut paper = scene();
-    paper.contact.law = haptize::scene::ContactLaw::Paper;
-    assert_eq!(refused(&sweep_of(&paper, "none", date)), "another algorithm");
+    assert_eq!(refused(&elsewhere), "another object, such as a mesh that has changed since");
+    let mut following = scene();
+    following.contact.law = haptize::scene::ContactLaw::Following;
+    assert_eq!(refused(&sweep_of(&following, "none", date)), "another algorithm");
     // A refusal changes nothing.
     assert_eq!(
         bake(&sweep(), &mut MadeUp::default(), &folder.output(), true, 9, usize::MAX).unwrap().resumed_points,
@@ -101,13 +99,12 @@ fn what_an_unfinished_bake_has_solved_is_not_thrown_away() {
     let folder = stopped_after(3);
     let kept = std::fs::read(folder.part()).unwrap();
     let error = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 9, usize::MAX).unwrap_err();
-    assert!(matches!(error, SweepError::Unfinished { .. }), "{error}");
     assert!(error.to_string().contains("--resume") && error.to_string().contains("delete it"), "{error}");
     assert!(std::fs::read(folder.part()).unwrap() == kept);
     // Nor is a file that is none of ours; one that holds nothing yet is.
     std::fs::write(folder.part(), "my notes").unwrap();
     let error = bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 9, usize::MAX).unwrap_err();
-    assert!(matches!(error, SweepError::ForeignPart { .. }), "{error}");
+    assert!(error.to_string().contains("cannot be continued"), "{error}");
     assert_eq!(std::fs::read(folder.part()).unwrap(), b"my notes");
     let binding = kept.len() - frames(&kept)[1..].iter().sum::<usize>();
     for length in [0, 7, 40, binding] {
@@ -138,7 +135,7 @@ fn two_bakes_into_one_file_do_not_mix() {
     let mut progress = |_| {
         if !std::mem::replace(&mut tried, true) {
             let second = bake(&sweep, &mut MadeUp::default(), &folder.output(), true, 10, usize::MAX);
-            assert!(matches!(second, Err(SweepError::Busy { .. })));
+            assert!(second.unwrap_err().to_string().contains("another process is writing"));
         }
     };
     sweep

@@ -5,12 +5,10 @@ use crate::{
     lowest,
 };
 use haptize::{
+    Error, ErrorKind,
     dataset::Dataset,
     scene::Scene,
-    sweep::{
-        BackendChoice, Bake, BakeError, Lowered, Merge, MergeError, Plan, Progress, Run, Shard, Sweep, SweepError,
-        SweepReport,
-    },
+    sweep::{BackendChoice, Bake, Lowered, Merge, Plan, Progress, Run, Shard, Sweep, SweepReport},
 };
 use std::{
     fs,
@@ -37,12 +35,7 @@ fn with<T>(scene: &Scene, day: usize, stop_at: usize, work: impl FnOnce(Bake<'_>
     work(Bake { scene, backend, measured: Some(40), aim: None, date: &date, stop: &stop, progress: &mut progress })
 }
 
-fn solve(
-    scene: &Scene,
-    folder: &Path,
-    index: usize,
-    stop_at: usize,
-) -> Result<(PathBuf, Option<SweepReport>), BakeError> {
+fn solve(scene: &Scene, folder: &Path, index: usize, stop_at: usize) -> Result<(PathBuf, Option<SweepReport>), Error> {
     with(scene, index, stop_at, |bake| bake.to_shard(folder, Shard { index, count: COUNT }))
 }
 
@@ -53,7 +46,7 @@ fn solved(scene: &Scene) -> tempfile::TempDir {
     folder
 }
 
-fn merged(parts: &Path, output: &Path) -> Result<SweepReport, MergeError> {
+fn merged(parts: &Path, output: &Path) -> Result<SweepReport, Error> {
     let merge = Merge::gather(&[parts.to_path_buf()])?;
     Ok(merge.to_file(output, Some(40), &AtomicBool::new(false), &mut |_| ())?.report)
 }
@@ -83,7 +76,7 @@ fn shards_merge_to_the_bits_of_one_bake() {
     // Out of order; each one stopped at its beginning and continued on another day.
     for index in [3, 0, 4, 2, 1] {
         let stopped = solve(&scene, &parts, index, 0).unwrap_err();
-        assert!(matches!(stopped, BakeError::Sweep(SweepError::Stopped { done: 0, .. })), "{stopped}");
+        assert!(stopped.to_string().starts_with("stopped after 0 of"), "{stopped}");
         let (file, report) = solve(&scene, &parts, index, usize::MAX).unwrap();
         assert_eq!(report.unwrap().points, Shard { index, count: COUNT }.points(469));
         let name = file.file_name().unwrap().to_str().unwrap().to_owned();
@@ -125,7 +118,7 @@ fn a_shard_run_twice_is_left_alone_and_an_interrupted_merge_continues() {
     assert!(merge.missing().is_empty() && merge.notes.len() == 1 && merge.notes[0].contains("shard 2 is there twice"));
     // Stopped while it looks for lower equilibria, after all points were copied.
     let stopped = merge.to_file(&folder.output(), Some(40), &AtomicBool::new(true), &mut |_| ()).unwrap_err();
-    assert!(matches!(stopped, MergeError::Stopped), "{stopped}");
+    assert_eq!(stopped.to_string(), "stopped; the same command continues");
     assert_eq!(folder.names(), ["a.haptize.part"]);
     // As if it had been killed while it copied.
     let part = fs::read(folder.part()).unwrap();
@@ -176,21 +169,19 @@ fn what_does_not_belong_together_is_refused() {
     let other = Scene::parse(&lowest::SCENE.replace("stiffness = 5000.0", "stiffness = 5001.0"), "deep.toml").unwrap();
     let (file, _) = solve(&other, parts.path(), 1, usize::MAX).unwrap();
     let refused = gathered();
-    assert!(matches!(refused, MergeError::Different { difference: "another text of the scene", .. }), "{refused}");
+    assert!(refused.to_string().contains("begun with another text of the scene"), "{refused}");
     fs::remove_file(file).unwrap();
     let (file, _) =
         with(&scene, 0, usize::MAX, |bake| bake.to_shard(parts.path(), Shard { index: 1, count: 7 })).unwrap();
     let refused = gathered();
-    assert!(matches!(refused, MergeError::Different { difference: "another number of shards", .. }), "{refused}");
+    assert!(refused.to_string().contains("begun with another number of shards"), "{refused}");
     fs::remove_file(file).unwrap();
     let note = parts.path().join("notes.shard");
     fs::write(&note, "my notes").unwrap();
     let refused = gathered();
-    assert!(matches!(&refused, MergeError::NoShard { path, .. } if *path == note), "{refused}");
-    assert!(matches!(
-        Merge::gather(&[note.with_extension("none")]).map(|_| ()).unwrap_err(),
-        MergeError::Unreadable { .. }
-    ));
+    assert!(refused.to_string().starts_with(&format!("{}: is no shard", note.display())), "{refused}");
+    let refused = Merge::gather(&[note.with_extension("none")]).map(|_| ()).unwrap_err();
+    assert_eq!(refused.kind(), ErrorKind::File, "{refused}");
     let empty = tempfile::tempdir().unwrap();
     let refused = Merge::gather(&[empty.path().to_path_buf()]).map(|_| ()).unwrap_err();
     assert!(refused.to_string().contains("bake --shard"), "{refused}");
@@ -219,11 +210,7 @@ fn no_bytes_make_a_wrong_dataset() {
 }
 
 /// Solves one of three shards of the small scene with made-up numbers.
-fn bake_made_up(
-    sweep: &mut Sweep<'_>,
-    folder: &Path,
-    index: usize,
-) -> Result<(PathBuf, Option<SweepReport>), SweepError> {
+fn bake_made_up(sweep: &mut Sweep<'_>, folder: &Path, index: usize) -> Result<(PathBuf, Option<SweepReport>), Error> {
     let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut |_| () };
     sweep.bake_shard(&mut MadeUp::default(), folder, Shard { index, count: 3 }, run)
 }
@@ -255,7 +242,7 @@ fn two_workers_on_one_shard_do_not_mix() {
     let mut progress = |_| {
         if !std::mem::replace(&mut tried, true) {
             let second = bake_made_up(&mut sweep_of(&fixture::scene(), "none", ""), parts.path(), 0);
-            assert!(matches!(second, Err(SweepError::Busy { .. })));
+            assert!(second.unwrap_err().to_string().contains("another process is writing"));
         }
     };
     let run = Run { chunk: 10, stop: &AtomicBool::new(false), progress: &mut progress };

@@ -1,9 +1,8 @@
-//! Searches for the equilibrium: the minimum of the energy by damped Newton steps, with its tangent, the paper's
-//! iteration, and contact with the surface at rest.
+//! Searches for the equilibrium: the minimum of the energy by damped Newton steps, with its tangent, and
+//! contact with the surface at rest.
 
 pub mod energy;
 pub mod newton;
-pub mod paper;
 pub mod rest;
 pub mod tangent;
 mod woodbury;

@@ -3,10 +3,15 @@
 //! form that reads back to the same value.
 
 use super::super::{
-    Axis, Dataset, Error, Grid, Stored, replace_file,
+    Axis, Dataset, Grid, Stored,
+    error::unwritable,
+    replace_file,
     stored::{Axes, Description},
 };
-use crate::csv::{Table, quoted};
+use crate::{
+    Error,
+    csv::{Table, quoted},
+};
 use safetensors::Dtype;
 use std::{
     fmt::{self, Debug, Display},
@@ -24,16 +29,13 @@ pub(super) fn contacts_file(path: &Path) -> PathBuf {
 
 pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut files = vec![path.to_path_buf()];
-    let failed = |path: &Path| {
-        let path = path.to_path_buf();
-        move |source| Error::Write { path, source }
-    };
     if dataset.contacts.is_some() {
         let contacts = contacts_file(path);
-        replace_file(&contacts, |writer| write_contacts(dataset, writer)).map_err(failed(&contacts))?;
+        replace_file(&contacts, |writer| write_contacts(dataset, writer))
+            .map_err(|source| unwritable(&contacts, &source))?;
         files.push(contacts);
     }
-    replace_file(path, |writer| write_points(dataset, writer)).map_err(failed(path))?;
+    replace_file(path, |writer| write_points(dataset, writer)).map_err(|source| unwritable(path, &source))?;
     Ok(files)
 }
 

@@ -10,9 +10,10 @@
 //! streams.
 
 use super::{
-    super::{Dataset, Error, Grid, file, replace_file},
+    super::{Dataset, Grid, error::unwritable, file, replace_file},
     meaning::{Meaning, lines, lines_name},
 };
+use crate::Error;
 use hdf5_writer::{AttributeBuilder, ByteOrder, DatasetBuilder, Datatype, Hdf5Builder, Hdf5WritePlan, WriteOptions};
 use safetensors::Dtype;
 use std::{
@@ -25,7 +26,7 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
         .and_then(|plan| plan.encode(WriteOptions { byte_order: ByteOrder::LittleEndian, ..WriteOptions::default() }))
         .map_err(io::Error::other)
         .and_then(|bytes| replace_file(path, |writer| writer.write_all(&bytes)));
-    written.map_err(|source| Error::Write { path: path.into(), source })?;
+    written.map_err(|source| unwritable(path, &source))?;
     Ok(vec![path.into()])
 }
 

@@ -5,7 +5,8 @@ mod hdf5;
 mod meaning;
 mod npz;
 
-use super::{Dataset, Error};
+use super::Dataset;
+use crate::Error;
 use std::path::{Path, PathBuf};
 
 /// Format of an export.
@@ -47,7 +48,7 @@ impl Dataset {
     /// Exports the dataset to `path`, replacing it whole or not at all; returns the files written.
     ///
     /// # Errors
-    /// [`Error::Write`] from the system.
+    /// When the system refuses.
     pub fn export(&self, path: &Path, format: Format) -> Result<Vec<PathBuf>, Error> {
         match format {
             Format::Npz => npz::export(self, path),

@@ -6,9 +6,10 @@
 //! not compressed: numbers of a smooth field hardly are.
 
 use super::{
-    super::{Dataset, Error, file, replace_file},
+    super::{Dataset, error::unwritable, file, replace_file},
     meaning::{Meaning, lines, lines_name},
 };
+use crate::Error;
 use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
 use safetensors::Dtype;
 use std::{
@@ -22,7 +23,7 @@ const ARRAY_HEADER: u64 = 1 << 16;
 
 pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
     replace_file(path, |writer| write(dataset, ZipWriter::new(Quiet::new(writer))))
-        .map_err(|source| Error::Write { path: path.into(), source })?;
+        .map_err(|source| unwritable(path, &source))?;
     Ok(vec![path.into()])
 }
 

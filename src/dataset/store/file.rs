@@ -35,9 +35,12 @@ use super::{
     record::{slope, width},
 };
 use crate::{
+    Error,
     contact::Status,
     dataset::{
-        Dataset, Error, Grid, Heading, Kind, Provenance, Surface, Target, Tensor, check_place, read::Container,
+        Dataset, Grid, Heading, Kind, Provenance, Surface, Target, Tensor, check_place,
+        error::{damaged, inconsistent, no_memory},
+        read::Container,
         surface_tensors, write_container,
     },
     memory::{self, Shortage},
@@ -148,8 +151,7 @@ pub(in crate::dataset) fn save(
     target: Target<'_>,
 ) -> Result<(), Error> {
     let shape = Shape { levels: store.space.levels(), order: ORDER.to_owned() };
-    let shape = serde_json::to_string(&shape)
-        .map_err(|error| Error::Inconsistent { path: target.path().into(), reason: error.to_string() })?;
+    let shape = serde_json::to_string(&shape).map_err(|error| inconsistent(target.path(), error))?;
     let blocks = store.blocks();
     let keys: Vec<u64> = blocks.iter().map(|(key, _)| *key).collect();
     let nodes = || blocks.iter().map(|(_, block)| block.nodes());
@@ -175,10 +177,10 @@ pub(in crate::dataset) fn save(
 
 /// Makes a dataset of a file whose header and checksum are sound.
 pub(in crate::dataset) fn decode(path: &Path, file: Container) -> Result<Dataset, Error> {
-    let damaged = |reason| Error::Damaged { path: path.into(), reason };
+    let damaged = |reason: String| damaged(path, reason);
     let (grid, provenance) = file.heading().map_err(damaged)?;
     // A file of some kilobytes may have a base of gigabytes.
-    check_memory(&grid).map_err(|shortage| Error::Memory { path: path.into(), shortage })?;
+    check_memory(&grid).map_err(|shortage| no_memory(path, shortage))?;
     read(file, grid, provenance).map_err(damaged)
 }
 
@@ -187,7 +189,10 @@ fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Datas
     let scene = file.text("scene")?.to_owned();
     let shape: Shape = serde_json::from_str(file.text("store")?).map_err(|error| format!("store: {error}"))?;
     if shape.order != ORDER {
-        return Err(format!("its nodes are to be interpolated by {:?}, which is no more: bake it again", shape.order));
+        return Err(format!(
+            "its nodes are to be interpolated by {:?}, which no longer exists: bake it again",
+            shape.order
+        ));
     }
     let space = Space::new(&grid, shape.levels).map_err(|error| error.to_string())?;
     let (joints, wide) = (space.joints(), width(space.joints()));

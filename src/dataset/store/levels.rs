@@ -44,10 +44,8 @@ pub struct Root {
     pub value: f64,
     /// Its gradient (sqrt(J)/rad or /m).
     pub slopes: JointVector,
-    /// Levels with a block around the configuration; 0 if there is none.
-    pub levels: u32,
-    /// Levels, from the base up, whose cell around the configuration has all its blocks.
-    pub whole: u32,
+    /// Whether the base lacks a block around the configuration.
+    pub absent: bool,
     /// Whether a node around the configuration did not converge.
     pub failed: bool,
 }
@@ -77,7 +75,7 @@ macro_rules! with_joints {
             3 => with_joints!(@ $d = 3, $value),
             4 => with_joints!(@ $d = 4, $value),
             5 => with_joints!(@ $d = 5, $value),
-            _ => with_joints!(@ $d = $crate::MAX_JOINTS, $value),
+            _ => with_joints!(@ $d = $crate::MAX_AXES, $value),
         }
     };
     (@ $d:ident = $joints:expr, $value:expr) => {{
@@ -93,31 +91,43 @@ pub(crate) fn root<N: Levels>(nodes: &N, cell: Cell) -> Root {
     with_joints!(nodes.base().joints(), D => sum::<N, D, { 1 << D }, { width(D) }, { rates(D) }>(nodes, cell))
 }
 
-/// Adds up the levels, each from the `W` numbers at the `C` corners of its cell. `C = 2^D`, `W = width(D)`,
-/// `R = rates(D)`.
-fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize>(nodes: &N, mut cell: Cell) -> Root {
-    let mut root = Root { value: 0.0, slopes: JointVector::zeros(D), levels: 0, whole: 0, failed: false };
+/// Hands `add` each level with a node around the `cell` of the base: its number, the `W` numbers at the `C` corners of
+/// its cell, and that cell. Returns whether the base lacks a block there, and whether a node there did not converge.
+fn walk<N: Levels, const C: usize, const W: usize>(
+    nodes: &N,
+    mut cell: Cell,
+    mut add: impl FnMut(u32, &mut [[f64; C]; W], &Cell),
+) -> (bool, bool) {
+    let (mut absent, mut failed) = (false, false);
     let mut numbers = [[0.0; C]; W];
     for level in 0..nodes.count() {
         if level > 0 {
             cell.halve();
         }
         let gathered = nodes.gather(level, &cell.low, &mut numbers);
+        absent |= level == 0 && !gathered.whole;
+        failed |= gathered.failed;
+        if gathered.any {
+            add(level, &mut numbers, &cell);
+        }
         if !gathered.found {
             break;
         }
-        root.levels = level + 1;
-        root.whole += u32::from(gathered.whole && root.whole == level);
-        root.failed |= gathered.failed;
-        if gathered.any {
-            let (value, slopes) = kernel::hermite::<D, C, W, R>(&mut numbers, &cell.fractions);
-            let rise = f64::from(1_u32 << level);
-            root.value += value;
-            root.slopes.iter_mut().zip(slopes).for_each(|(sum, slope)| *sum += rise * slope);
-        }
     }
-    root.slopes.iter_mut().zip(&nodes.base().axes).for_each(|(slope, axis)| *slope /= axis.step);
-    root
+    (absent, failed)
+}
+
+/// The sum of the levels, with slopes. `C = 2^D`, `W = width(D)`, `R = rates(D)`.
+fn sum<N: Levels, const D: usize, const C: usize, const W: usize, const R: usize>(nodes: &N, cell: Cell) -> Root {
+    let (mut value, mut slopes) = (0.0, JointVector::zeros(D));
+    let (absent, failed) = walk::<N, C, W>(nodes, cell, |level, numbers, cell| {
+        let (added, rates) = kernel::hermite::<D, C, W, R>(numbers, &cell.fractions);
+        let rise = f64::from(1_u32 << level);
+        value += added;
+        slopes.iter_mut().zip(rates).for_each(|(sum, rate)| *sum += rise * rate);
+    });
+    slopes.iter_mut().zip(&nodes.base().axes).for_each(|(slope, axis)| *slope /= axis.step);
+    Root { value, slopes, absent, failed }
 }
 
 /// The numbers of `nodes` in a `cell` of the base, each interpolated multilinearly; those of the first axes first, zeros
@@ -126,25 +136,15 @@ pub(crate) fn linear<N: Levels>(nodes: &N, cell: Cell) -> [f64; MAX_WIDTH] {
     with_joints!(nodes.base().joints(), D => linear_sum::<N, { 1 << D }, { width(D) }>(nodes, cell))
 }
 
-/// Adds up the levels, each from the `W` numbers at the `C` corners of its cell.
-fn linear_sum<N: Levels, const C: usize, const W: usize>(nodes: &N, mut cell: Cell) -> [f64; MAX_WIDTH] {
+/// The sum of the levels. `C = 2^d`, `W = width(d)`.
+fn linear_sum<N: Levels, const C: usize, const W: usize>(nodes: &N, cell: Cell) -> [f64; MAX_WIDTH] {
     let mut sums = [0.0; MAX_WIDTH];
-    let mut numbers = [[0.0; C]; W];
-    for level in 0..nodes.count() {
-        if level > 0 {
-            cell.halve();
+    walk::<N, C, W>(nodes, cell, |_, numbers, cell| {
+        let weights = cell.weights::<C>();
+        for (sum, numbers) in sums.iter_mut().zip(numbers) {
+            *sum += numbers.iter().zip(&weights).map(|(number, weight)| weight * number).sum::<f64>();
         }
-        let gathered = nodes.gather(level, &cell.low, &mut numbers);
-        if !gathered.found {
-            break;
-        }
-        if gathered.any {
-            let weights = cell.weights::<C>();
-            for (sum, numbers) in sums.iter_mut().zip(&numbers) {
-                *sum += numbers.iter().zip(&weights).map(|(number, weight)| weight * number).sum::<f64>();
-            }
-        }
-    }
+    });
     sums
 }
 

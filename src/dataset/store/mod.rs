@@ -32,9 +32,9 @@ pub mod space;
 
 pub use block::{Block, Nodes};
 pub(crate) use space::Cell;
-pub use space::{Place, Space, SpaceError};
+pub use space::{Place, Space};
 
-use crate::{MAX_JOINTS, dataset::Grid};
+use crate::{Error, MAX_AXES, dataset::Grid, error};
 pub(crate) use block::beyond;
 pub use levels::Root;
 use levels::linear;
@@ -72,31 +72,6 @@ impl Hasher for KeyHasher {
     }
 }
 
-/// A block was not published; the store is as before.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PublishError {
-    /// The block lies outside the space, or its columns do not belong together.
-    #[error("block {key:#x} of the store is not sound")]
-    Unsound {
-        /// Its key.
-        key: u64,
-    },
-    /// A block of the level below is missing.
-    #[error("block {key:#x} of the store comes before block {missing:#x}, on which it rests")]
-    Order {
-        /// Its key.
-        key: u64,
-        /// That of the other.
-        missing: u64,
-    },
-    /// It is there.
-    #[error("block {key:#x} of the store is there twice")]
-    Taken {
-        /// Its key.
-        key: u64,
-    },
-}
-
 impl Store {
     /// An empty store over `space`.
     #[must_use]
@@ -131,11 +106,10 @@ impl Store {
         let space = self.space.clone();
         let (joints, is_one) = (space.joints(), space.block_nodes() == 1);
         let (below, block) = (level.checked_sub(1), *block);
-        let last = below.map_or([0; MAX_JOINTS], |below| space.last(below));
+        let last = below.map_or([0; MAX_AXES], |below| space.last(below));
         // A block of 2^d nodes: node `block` of the level below, and those one farther; at most twice as many blocks
         // are listed as there are. One node: those around it, along the axes along which it lies between two.
-        let (first, axes) =
-            if is_one { (block.map(|i| i >> 1), block.map(|i| i & 1)) } else { (block, [1; MAX_JOINTS]) };
+        let (first, axes) = if is_one { (block.map(|i| i >> 1), block.map(|i| i & 1)) } else { (block, [1; MAX_AXES]) };
         let between = (0..joints).map(|a| (axes[a] as usize) << a).sum::<usize>();
         let sets = (0..1_usize << joints).filter(move |set| below.is_some() && set & !between == 0);
         let inside =
@@ -149,24 +123,26 @@ impl Store {
     /// Publishes a block: its nodes, of those that [`Space::nodes`] names.
     ///
     /// # Errors
-    /// [`PublishError`].
-    pub fn publish(&mut self, level: u32, place: &Place, nodes: Nodes) -> Result<(), PublishError> {
+    /// When the block lies outside the space, its columns do not belong together, a block of the level below is missing,
+    /// or it is there already.
+    pub fn publish(&mut self, level: u32, place: &Place, nodes: Nodes) -> Result<(), Error> {
         let key = self.space.key(level, place);
         if self.space.block(key) != Some((level, *place)) {
-            return Err(PublishError::Unsound { key });
+            return Err(error!("block {key:#x} of the store is not sound"));
         }
         let all: Vec<(usize, Place)> = self.space.nodes(level, place).collect();
         let allowed = all.iter().fold(0, |set, (place, _)| set | 1 << place);
         if !nodes.is_sound(self.space.joints(), allowed) {
-            return Err(PublishError::Unsound { key });
+            return Err(error!("block {key:#x} of the store is not sound"));
         }
         for (at, below) in self.foundation(level, place) {
             if self.get(at, &below).is_none() {
-                return Err(PublishError::Order { key, missing: self.space.key(at, &below) });
+                let missing = self.space.key(at, &below);
+                return Err(error!("block {key:#x} of the store comes before block {missing:#x}, on which it rests"));
             }
         }
         if self.blocks.contains_key(&key) {
-            return Err(PublishError::Taken { key });
+            return Err(error!("block {key:#x} of the store is there twice"));
         }
         let surplus = [self.surplus(level, &all, &nodes), self.slip_surplus(level, &all, &nodes)];
         self.blocks.insert(key, Block::new(nodes, surplus));

@@ -13,8 +13,9 @@ mod polygon;
 mod stl;
 mod text;
 
-use super::{Body, ObjectError, topology::place};
-use crate::input;
+use super::{Body, out_of_range, topology::place};
+use crate::scene::Placement;
+use crate::{Error, ErrorKind, input};
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;
@@ -31,21 +32,21 @@ type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 const MAX_BYTES: u64 = 1 << 28;
 
 /// Reads the surface in `file`; merged nodes are reported in `warnings`.
-pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<String>) -> Result<Surface, ObjectError> {
-    if !(scale > 0.0 && scale.is_finite()) {
-        return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
-    }
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+pub(crate) fn read(file: &Path, placement: &Placement, warnings: &mut Vec<String>) -> Result<Surface, Error> {
+    check_scale(placement)?;
+    let unreadable = |reason: String| unreadable(file, &reason);
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let reader = match extension.as_str() {
         "obj" => obj::read,
         "stl" => stl::read,
         "ply" => ply::read,
-        _ => return Err(ObjectError::Format { file: file.to_owned() }),
+        _ => {
+            return Err(Error::at(file, "not a known mesh format: give a file that ends in .obj, .stl or .ply"));
+        }
     };
     let (nodes, mut triangles) = reader(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
     let count = nodes.len();
-    let mut nodes = weld(nodes, &mut triangles);
+    let nodes = weld(nodes, &mut triangles);
     if nodes.len() < count && extension != "stl" {
         let (file, merged) = (file.display(), count - nodes.len());
         warnings.push(format!("{file}: {merged} of {count} nodes lay exactly on another and were merged with it"));
@@ -56,26 +57,23 @@ pub(crate) fn read(file: &Path, scale: f64, centre: DVec3, warnings: &mut Vec<St
         let (file, dropped) = (file.display(), faces - triangles.len());
         warnings.push(format!("{file}: {dropped} of {faces} faces had two corners in one place and were left out"));
     }
-    nodes.iter_mut().for_each(|node| *node = scale * *node + centre);
-    warnings.extend(oversize(file, scale, &nodes));
+    let nodes = placement.place(nodes);
+    warnings.extend(oversize(file, placement, &nodes));
     Ok((nodes, triangles))
 }
 
 /// Reads the tetrahedra in a Gmsh file. `wanted`: the physical volumes that the scene names, in its order.
 pub(super) fn read_tetrahedra(
     file: &Path,
-    scale: f64,
-    centre: DVec3,
+    placement: &Placement,
     wanted: &[u32],
     warnings: &mut Vec<String>,
-) -> Result<Body, ObjectError> {
-    if !(scale > 0.0 && scale.is_finite()) {
-        return Err(ObjectError::Parameter { name: "scale", value: scale, range: "positive and finite" });
-    }
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+) -> Result<Body, Error> {
+    check_scale(placement)?;
+    let unreadable = |reason: String| unreadable(file, &reason);
     let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
-    let nodes: Vec<DVec3> = mesh.nodes.iter().map(|node| scale * *node + centre).collect();
-    warnings.extend(oversize(file, scale, &nodes));
+    let nodes = placement.place(mesh.nodes);
+    warnings.extend(oversize(file, placement, &nodes));
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra, mesh.mid_nodes);
     let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
@@ -85,14 +83,25 @@ pub(super) fn read_tetrahedra(
     Ok(ordered)
 }
 
+/// Least and greatest coordinates of `nodes` (m).
+pub(crate) fn corners(nodes: &[DVec3]) -> [DVec3; 2] {
+    [DVec3::min, DVec3::max].map(|pick| nodes.iter().copied().reduce(pick).unwrap_or_default())
+}
+
 /// Greatest extent of `nodes` along an axis (m).
 pub(crate) fn length(nodes: &[DVec3]) -> f64 {
-    let end = |pick: fn(DVec3, DVec3) -> DVec3| nodes.iter().copied().reduce(pick).unwrap_or_default();
-    (end(DVec3::max) - end(DVec3::min)).max_element()
+    let [low, high] = corners(nodes);
+    (high - low).max_element()
+}
+
+/// Refuses a scale that a specification made in code may have.
+fn check_scale(placement: &Placement) -> Result<(), Error> {
+    let value = placement.scale;
+    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(out_of_range("scale", value, "positive and finite")) }
 }
 
 /// A warning where the scale was forgotten.
-fn oversize(file: &Path, scale: f64, nodes: &[DVec3]) -> Option<String> {
+fn oversize(file: &Path, Placement { scale, .. }: &Placement, nodes: &[DVec3]) -> Option<String> {
     let length = length(nodes);
     (length > MOST_METRES).then(|| {
         format!(
@@ -103,9 +112,14 @@ fn oversize(file: &Path, scale: f64, nodes: &[DVec3]) -> Option<String> {
     })
 }
 
+/// The error of a mesh file that cannot be read.
+fn unreadable(file: &Path, reason: &str) -> Error {
+    Error::at(file, format_args!("cannot read the mesh: {reason}")).of(ErrorKind::File)
+}
+
 /// Opens a file of bounded length.
-fn open(file: &Path) -> Result<File, ObjectError> {
-    let unreadable = |reason: String| ObjectError::File { file: file.to_owned(), reason };
+fn open(file: &Path) -> Result<File, Error> {
+    let unreadable = |reason: String| unreadable(file, &reason);
     let stream = input::open(file).map_err(|error| unreadable(error.to_string()))?;
     let attributes = stream.metadata().map_err(|error| unreadable(error.to_string()))?;
     if attributes.len() > MAX_BYTES {

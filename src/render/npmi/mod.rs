@@ -32,7 +32,7 @@ mod stops;
 mod tests;
 
 use crate::{
-    JointMatrix, JointVector, MAX_JOINTS,
+    Error, JointMatrix, JointVector, MAX_JOINTS, error,
     field::range::Stops,
     joint_matrix::{cholesky, solve_transposed},
     proxy::Chain,
@@ -107,22 +107,8 @@ pub struct Step {
     pub stopped: [bool; MAX_JOINTS],
 }
 
-/// The proxy cannot be integrated.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum InertiaError {
-    /// M is not symmetric positive definite.
-    #[error("the proxy's inertia is not positive definite: give every joint a mass or a rotor inertia")]
-    NotPositiveDefinite,
-    /// A pair of limits is not finite or not ascending.
-    #[error("joint {joint}'s limits {limits:?} are not ascending finite numbers")]
-    Limits {
-        /// Number of the joint, from zero.
-        joint: usize,
-        /// Least and greatest coordinate.
-        limits: [f64; 2],
-    },
-}
+/// What is wrong with an M that is not symmetric positive definite.
+const INDEFINITE: &str = "the proxy's inertia is not positive definite: give every joint a mass or a rotor inertia";
 
 impl Motion {
     /// At rest at `position`.
@@ -144,10 +130,10 @@ impl Npmi {
     ///
     /// # Errors
     /// When the inertia is not positive definite or a limit is none.
-    pub fn new(inertia: &JointMatrix, limits: &[[f64; 2]]) -> Result<Self, InertiaError> {
+    pub fn new(inertia: &JointMatrix, limits: &[[f64; 2]]) -> Result<Self, Error> {
         let (joints, limits) = checked(limits)?;
         let symmetric = (0..joints).all(|i| (0..i).all(|j| inertia[i][j] == inertia[j][i]));
-        let factor = cholesky(inertia, joints).filter(|_| symmetric).ok_or(InertiaError::NotPositiveDefinite)?;
+        let factor = cholesky(inertia, joints).filter(|_| symmetric).ok_or(INDEFINITE)?;
         let stage = MidpointInertia { inertia: *inertia, factor, gyroscopic: [[0.0; MAX_JOINTS]; MAX_JOINTS] };
         Ok(Self { joints, inertia: Inertia::Constant(Box::new(stage)), limits })
     }
@@ -157,11 +143,11 @@ impl Npmi {
     /// # Errors
     /// When the inertia is not positive definite in every configuration, for want of a rotor inertia, or a limit is
     /// none.
-    pub fn of_chain(chain: &Chain) -> Result<Self, InertiaError> {
+    pub fn of_chain(chain: &Chain) -> Result<Self, Error> {
         let limits: Vec<[f64; 2]> = chain.joints.iter().map(|joint| joint.limits).collect();
         let (joints, limits) = checked(&limits)?;
         if !chain.joints.iter().all(|joint| joint.rotor_inertia > 0.0) {
-            return Err(InertiaError::NotPositiveDefinite);
+            return Err(INDEFINITE.into());
         }
         Ok(Self { joints, inertia: Inertia::Chain(chain.clone()), limits })
     }
@@ -334,11 +320,11 @@ pub(super) fn flush(state: &mut f64) {
 }
 
 /// Number of joints and their `limits`, checked.
-fn checked(limits: &[[f64; 2]]) -> Result<(usize, Stops), InertiaError> {
+fn checked(limits: &[[f64; 2]]) -> Result<(usize, Stops), Error> {
     let joints = limits.len().min(MAX_JOINTS);
     for (joint, &[least, greatest]) in limits.iter().enumerate() {
         if !(least.is_finite() && greatest.is_finite() && least <= greatest) {
-            return Err(InertiaError::Limits { joint, limits: [least, greatest] });
+            return Err(error!("joint {joint}'s limits {:?} are not ascending finite numbers", [least, greatest]));
         }
     }
     let mut all = [[0.0; 2]; MAX_JOINTS];

@@ -1,10 +1,10 @@
 //! Grids of other spacings over the scene's region, looked up by each interpolation: error, bake time, size.
 
-use super::{Accuracy, AccuracyError, Row, Study, in_turns};
+use super::{Accuracy, Row, Study, in_turns};
 use crate::{
-    JointVector,
+    Error, JointVector,
     dataset::Dataset,
-    field::{FieldError, TorqueField},
+    field::TorqueField,
     scene::{Interpolation, Scene},
     sweep::{
         baked,
@@ -23,7 +23,7 @@ pub(super) const LOOK_UPS: usize = 20_000;
 /// Grid points at which look-ups are timed: 256 of them stay in the cache, as where a hand moves they do.
 const PLACES: usize = 256;
 
-fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, FieldError> {
+fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Result<TorqueField, Error> {
     let spec = &scene.haptics;
     TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)
 }
@@ -34,7 +34,7 @@ pub(super) fn spacing(
     reference: &Reference,
     limit: usize,
     study: &mut Accuracy,
-) -> Result<Dataset, AccuracyError> {
+) -> Result<Dataset, Error> {
     let mut grids: Vec<Scene> = Vec::new();
     for coarser in COARSER {
         let spaced = spaced(scene, |steps| (steps / coarser).round());
@@ -76,7 +76,7 @@ pub(super) fn spacing(
 }
 
 /// Time of a look-up, relative to that of `linear`.
-pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Result<(), AccuracyError> {
+pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Result<(), Error> {
     let points = own.grid.points();
     let places: Vec<JointVector> = (0..PLACES).map(|k| own.grid.configuration(k * points / PLACES)).collect();
     let fields = Interpolation::ALL.map(|interpolation| field(scene, own, interpolation));
@@ -85,7 +85,7 @@ pub(super) fn look_up(scene: &Scene, own: &Dataset, study: &mut Accuracy) -> Res
         for q in places.iter().cycle().take(LOOK_UPS) {
             black_box(fields[k].sample(black_box(q)));
         }
-        Ok::<(), AccuracyError>(())
+        Ok::<(), Error>(())
     })?;
     study.look_up = timed[0].0 / LOOK_UPS as f64;
     for (interpolation, (time, ())) in Interpolation::ALL.into_iter().zip(timed) {

@@ -20,12 +20,11 @@ pub use live::LIVE;
 pub use report::{FILES, write_all};
 
 use crate::{
+    Error,
     contact::Model,
-    field::FieldError,
-    object::ObjectError,
     proxy::Chain,
-    scene::{JointKind, NormUnit, Scene, SceneError},
-    sweep::{BackendError, BakeError, ReferenceError, build_object, reference::Reference, sample, spacing},
+    scene::{JointKind, NormUnit, Scene},
+    sweep::{build_object, reference::Reference, sample, spacing},
 };
 use serde::Serialize;
 use std::time::Instant;
@@ -130,36 +129,12 @@ pub struct Extent {
     pub rounds: usize,
 }
 
-/// The study failed.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum AccuracyError {
-    /// The object cannot be built.
-    #[error(transparent)]
-    Object(#[from] ObjectError),
-    /// No backend.
-    #[error(transparent)]
-    Backend(#[from] BackendError),
-    /// A grid cannot be haptized.
-    #[error(transparent)]
-    Bake(#[from] BakeError),
-    /// A dataset cannot be interpolated.
-    #[error(transparent)]
-    Field(#[from] FieldError),
-    /// A variant of the scene is none.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Nothing to compare with.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
-}
-
 /// Measures `scene`. `progress` receives the name of the next step.
 ///
 /// # Errors
-/// Any [`AccuracyError`].
-pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) -> Result<Accuracy, AccuracyError> {
-    let object = build_object(scene).map_err(BakeError::from)?;
+/// Any [`Error`].
+pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) -> Result<Accuracy, Error> {
+    let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     progress("reference");

@@ -9,9 +9,9 @@
 //! converge with the mesh; contact that of rigid contact. Both are properties of the body: the rows say how much they
 //! matter, not how wrong they are.
 
-use super::{Accuracy, AccuracyError, Row, Study, in_turns};
+use super::{Accuracy, Row, Study, in_turns};
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Model, Status},
     object::Object,
     proxy::Chain,
@@ -42,7 +42,7 @@ struct Variant {
 }
 
 /// All studies that the scene allows.
-pub(super) fn studies(scene: &Scene, reference: &Reference, study: &mut Accuracy) -> Result<(), AccuracyError> {
+pub(super) fn studies(scene: &Scene, reference: &Reference, study: &mut Accuracy) -> Result<(), Error> {
     let studies = [
         (Study::Tolerance, tolerances(scene), ""),
         (Study::Law, laws(scene), ""),
@@ -68,12 +68,12 @@ fn compare(
     variants: &[Variant],
     reference: &Reference,
     study: &mut Accuracy,
-) -> Result<(), AccuracyError> {
+) -> Result<(), Error> {
     let scenes: Vec<&Scene> = variants.iter().map(|variant| &variant.scene).chain([own]).collect();
     let built: Vec<(Object, Chain)> = scenes
         .iter()
         .map(|scene| Ok((Object::build(&scene.object)?, Chain::new(&scene.proxy))))
-        .collect::<Result<_, AccuracyError>>()?;
+        .collect::<Result<_, Error>>()?;
     let models: Vec<Model<'_>> = scenes
         .iter()
         .zip(&built)
@@ -180,7 +180,7 @@ fn skins(scene: &Scene) -> Vec<Variant> {
 
 /// Other spacings of nodes along links. Contact stiffness is that of the link: where the scene gives it per node, it is
 /// scaled.
-fn links(scene: &Scene) -> Result<Vec<Variant>, AccuracyError> {
+fn links(scene: &Scene) -> Result<Vec<Variant>, Error> {
     let mut variants = Vec::new();
     for factor in SPACINGS {
         let (mut text, mut varied): (Table, _) = (scene.text.parse().unwrap_or_default(), false);
@@ -208,7 +208,7 @@ fn links(scene: &Scene) -> Result<Vec<Variant>, AccuracyError> {
 }
 
 /// Other contact stiffnesses. Their value is the compliance, which rigid contact has none of.
-fn stiffnesses(scene: &Scene) -> Result<Vec<Variant>, AccuracyError> {
+fn stiffnesses(scene: &Scene) -> Result<Vec<Variant>, Error> {
     let mut variants = Vec::new();
     for factor in SOFTER {
         let mut text: Table = scene.text.parse().unwrap_or_default();

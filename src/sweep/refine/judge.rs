@@ -7,14 +7,14 @@
 
 use super::nodebook::HeldNodes;
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Model, Solvers, Status},
     dataset::{InterpolationError, MeasuredError},
     scene::{Interpolation, Scene},
     store::Store,
     sweep::{
         lowest::{self, Lattice},
-        reference::{Reference, ReferenceError},
+        reference::Reference,
     },
 };
 
@@ -27,7 +27,7 @@ impl Judge {
     ///
     /// # Errors
     /// When nothing touches.
-    pub fn new(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, ReferenceError> {
+    pub fn new(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, Error> {
         Reference::in_contact(scene, model, seed, contacts).map(Self)
     }
 

@@ -33,11 +33,11 @@ use super::{
     thin_parts,
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Backend, Model, Solvers, Status},
     dataset::Grid,
     scene::EffortNorm,
-    store::{Nodes, Place, PublishError, Space, SpaceError, Store, beyond, record::width},
+    store::{Nodes, Place, Space, Store, beyond, record::width},
 };
 use nodebook::{HeldNodes, Nodebook, held_bytes};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -93,28 +93,14 @@ pub struct Refined {
     pub notices: Vec<String>,
 }
 
-/// A store cannot be filled.
-#[derive(Debug, thiserror::Error)]
-pub enum RefineError {
-    /// The base cannot be refined so often.
-    #[error(transparent)]
-    Space(#[from] SpaceError),
-    /// A solved block was refused.
-    #[error(transparent)]
-    Publish(#[from] PublishError),
-    /// The backend failed.
-    #[error("the backend failed: {0}")]
-    Backend(#[source] Box<dyn std::error::Error + Send + Sync>),
-}
-
 impl Refine<'_> {
     /// Fills a store, whose nodes `backend` solves, until its error at the configurations of the first of `judges` is
     /// at most the aim, or nothing more can be done. Equilibria of both judges are replaced by lower ones that are
     /// reached from the nodes.
     ///
     /// # Errors
-    /// [`RefineError`].
-    pub fn fill<B: Backend>(&self, judges: &mut [Judge; 2], backend: &mut B) -> Result<Refined, RefineError> {
+    /// When the base cannot be refined so often, or the backend fails.
+    pub fn fill<B: Backend>(&self, judges: &mut [Judge; 2], backend: &mut B) -> Result<Refined, Error> {
         let [seen, unseen] = judges;
         let exact = self.model.with_contact(tight(self.model.contact, REFERENCE_TOLERANCE));
         let solvers = Solvers::new(&exact, rayon::current_num_threads());
@@ -153,7 +139,7 @@ impl Refine<'_> {
     }
 
     /// The base alone.
-    fn begin<'a, B: Backend>(&'a self, backend: &'a mut B, lowest: bool) -> Result<Filling<'a, B>, RefineError> {
+    fn begin<'a, B: Backend>(&'a self, backend: &'a mut B, lowest: bool) -> Result<Filling<'a, B>, Error> {
         let space = Space::new(&self.base, self.levels)?;
         let norm = EffortNorm::new(self.model.chain.joints.iter().map(|joint| joint.kind.unit()));
         let scale = Scale::new(self.model, &space);
@@ -188,7 +174,7 @@ struct Filling<'a, B> {
 
 impl<B: Backend> Filling<'_, B> {
     /// The store of what is there.
-    fn store(&self) -> Result<Store, PublishError> {
+    fn store(&self) -> Result<Store, Error> {
         let mut store = Store::new(self.book.nodes.space.clone());
         for (level, nodes) in (0..).zip(&self.nodes) {
             publish(&mut store, &self.book.nodes, level, nodes)?;
@@ -233,7 +219,7 @@ impl<B: Backend> Filling<'_, B> {
     }
 
     /// Solves those of `nodes` of `level` that are not, and compares `store` with them.
-    fn compare(&mut self, store: &Store, level: u32, nodes: &BTreeSet<Place>) -> Result<(), RefineError> {
+    fn compare(&mut self, store: &Store, level: u32, nodes: &BTreeSet<Place>) -> Result<(), Error> {
         self.book.solve(level, nodes.iter().copied())?;
         for node in nodes {
             if !self.squares.contains_key(&(level, *node)) {
@@ -250,7 +236,7 @@ impl<B: Backend> Filling<'_, B> {
     }
 
     /// Expects an error of each leaf.
-    fn expect(&mut self, store: &Store) -> Result<(), RefineError> {
+    fn expect(&mut self, store: &Store) -> Result<(), Error> {
         let space = self.book.nodes.space.clone();
         let joints = space.joints();
         let cells: Vec<Place> = space.base_cells().collect();
@@ -301,7 +287,7 @@ impl<B: Backend> Filling<'_, B> {
     }
 
     /// Refines for a squared error of `goal` times that of `store`, which is the store of what is there.
-    fn refine(&mut self, store: &Store, goal: f64) -> Result<(), RefineError> {
+    fn refine(&mut self, store: &Store, goal: f64) -> Result<(), Error> {
         let space = self.book.nodes.space.clone();
         self.expect(store)?;
         let marked = self.mark(goal);
@@ -337,7 +323,7 @@ fn inside(space: &Space, low: &Place) -> impl Iterator<Item = Place> {
 }
 
 /// Publishes `nodes` of `level`, all solved, with whatever empty blocks they rest on.
-fn publish(store: &mut Store, held: &HeldNodes, level: u32, nodes: &BTreeSet<Place>) -> Result<(), PublishError> {
+fn publish(store: &mut Store, held: &HeldNodes, level: u32, nodes: &BTreeSet<Place>) -> Result<(), Error> {
     let space = store.space().clone();
     let mut blocks: BTreeMap<(u32, Place), Nodes> = BTreeMap::new();
     for node in nodes {

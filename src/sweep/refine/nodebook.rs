@@ -7,10 +7,10 @@
 //!
 //! Memory: the forces of all nodes, in f32, while the store is filled.
 
-use super::RefineError;
 use crate::{
-    JointVector,
+    Error, JointVector,
     contact::{Backend, CHUNKS_IN_FLIGHT, Equilibrium, NodeForce, Solver, Solvers, Status},
+    error,
     store::{Place, Space, beyond},
     sweep::{
         lowest::{Lattice, Lowered, settle},
@@ -172,8 +172,8 @@ impl<'a, B: Backend> Nodebook<'a, B> {
     /// Solves those of `nodes` of `level` that are not, and lowers them and others by one another.
     ///
     /// # Errors
-    /// [`RefineError::Backend`] when the backend fails.
-    pub fn solve(&mut self, level: u32, nodes: impl IntoIterator<Item = Place>) -> Result<(), RefineError> {
+    /// When the backend fails.
+    pub fn solve(&mut self, level: u32, nodes: impl IntoIterator<Item = Place>) -> Result<(), Error> {
         let wanted: BTreeSet<Place> = nodes.into_iter().filter(|node| self.nodes.get(level, node).is_none()).collect();
         let wanted: Vec<Place> = wanted.into_iter().collect();
         for places in wanted.chunks(CHUNKS_IN_FLIGHT.saturating_mul(self.batch.max(1))) {
@@ -183,7 +183,7 @@ impl<'a, B: Backend> Nodebook<'a, B> {
             let first = nodes.count();
             let mut note = |node, notice| notices.push(format!("from the store's node {} on: {notice}", first + node));
             let solved = solve_all(*backend, *batch, solvers, &configurations, &nodes.scale, &mut note)
-                .map_err(|error| RefineError::Backend(Box::new(error)))?;
+                .map_err(|why| error!("the backend failed: {why}"))?;
             let points = places.iter().map(|place| (level, *place));
             nodes.held.extend(points.zip(solved.into_iter().map(|(node, here)| Held::new(node, &here))));
         }

@@ -2,7 +2,7 @@
 //!
 //! A [`Case`] varies one thing that is known to break solvers, loops or grids, and returns a [`CaseResult`] for each
 //! figure that it measured: the worst one found, the bound that it must keep, and so whether it passed. One file or
-//! folder a room holds its cases. The tests run a sample of each and print the table of docs/stability.md:
+//! folder a room holds its cases. The tests run a sample of each and print what docs/stability.md condenses:
 //! `cargo test --release --test contact hard_cases -- --nocapture`; with `--ignored` they run all that the cases name.
 
 mod contact;

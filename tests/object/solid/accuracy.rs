@@ -100,7 +100,7 @@ fn the_error_that_is_stated_of_a_lattice_is_what_finer_cubes_change() {
             let shell = super::block([16, 16, 8], 0.00375);
             let block = solid(shell, elastic(poisson, Some(cell)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO);
             let own = spec(
-                Shape::Mesh { file: "body".into(), scale: 1.0, centre: DVec3::ZERO, refine: None },
+                Shape::Mesh { file: "body".into(), placement: Placement::METRES, refine: None },
                 elastic(poisson, Some(cell)),
                 clamped(1e-6),
             );

@@ -23,7 +23,7 @@ fn torus(radii: [f64; 2], counts: [u32; 2]) -> Shell {
 /// The mesh of a file beside the shipped scenes, which are in millimetres.
 fn shipped(name: &str, cell: f64) -> Object {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name);
-    let shape = Shape::Mesh { file, scale: 1e-3, centre: DVec3::ZERO, refine: None };
+    let shape = Shape::Mesh { file, placement: Placement { scale: 1e-3, ..Placement::METRES }, refine: None };
     Object::build(&spec(shape, elastic(0.45, Some(cell)), bed(1e7))).unwrap()
 }
 

@@ -72,7 +72,7 @@ fn build(content: &[u8], material: Material) -> Result<Object, String> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("block.msh");
     std::fs::write(&file, content).unwrap();
-    let shape = Shape::Tetrahedra { file, scale: 1.0, centre: DVec3::ZERO };
+    let shape = Shape::Tetrahedra { file, placement: Placement::METRES };
     let ground = match material {
         Material::Springs(_) => GroundSpec { stiffness: GroundStiffness::PerNode(1.0), nodes: GroundNodes::All },
         _ => underside(),
@@ -174,7 +174,7 @@ fn files_of_second_order_are_the_same_solid_with_finer_triangles_and_may_be_curv
         });
         assert!(count.count() > 10);
         let stored = haptize::dataset::Surface::of(&curved).object(&spec(
-            Shape::Tetrahedra { file: "gone.msh".into(), scale: 1.0, centre: DVec3::ZERO },
+            Shape::Tetrahedra { file: "gone.msh".into(), placement: Placement::METRES },
             homogeneous(),
             underside(),
         ));

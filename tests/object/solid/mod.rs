@@ -9,7 +9,7 @@ mod lattice;
 
 use glam::{DMat3, DVec3};
 use haptize::object::Object;
-use haptize::scene::{ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape};
+use haptize::scene::{ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Placement, Shape};
 use std::collections::HashMap;
 
 const YOUNG: f64 = 1e5;
@@ -73,7 +73,7 @@ fn block(counts: [i32; 3], edge: f64) -> Shell {
 
 /// The object of `material` and `ground` in the surface, turned by `turn` and then shifted by `shift`.
 fn solid((nodes, triangles): Shell, material: Material, ground: GroundSpec, turn: DMat3, shift: DVec3) -> Object {
-    let shape = Shape::Mesh { file: "body".into(), scale: 1.0, centre: DVec3::ZERO, refine: None };
+    let shape = Shape::Mesh { file: "body".into(), placement: Placement::METRES, refine: None };
     let nodes = nodes.into_iter().map(|node| turn * node + shift).collect();
     Object::from_surface(&spec(shape, material, ground), nodes, triangles).unwrap()
 }

@@ -2,15 +2,15 @@
 
 pub use haptize::fixtures::worlds::{BLOCK_STIFFNESS as STIFFNESS, block, block_scene as scene};
 use haptize::{
-    JointVector,
+    Error, JointVector,
     render::{
         haptic::{Inputs, Output, State},
-        setup::{Setup, SetupError},
+        setup::Setup,
     },
 };
 
 /// The block, ready to be felt.
-pub fn setup(haptics: &str) -> Result<Setup, SetupError> {
+pub fn setup(haptics: &str) -> Result<Setup, Error> {
     Setup::new(&block(haptics))
 }
 

@@ -22,13 +22,13 @@ use haptize::{
     render::{
         accounts::Accounts,
         flags::{Fault, Flags},
-        graphics::{ContactForces, Graphics, GraphicsError, ObjectMotion},
-        haptic::{Haptics, Inputs, JointsError},
+        graphics::{ContactForces, Graphics, ObjectMotion},
+        haptic::{Haptics, Inputs},
         npmi::Npmi,
         passivity,
         recording::Recording,
         session::{self, Driver, Plan},
-        setup::{Setup, SetupError, labels},
+        setup::{Setup, labels},
         trace::{Frame, Tick, Trace},
     },
     scene::{

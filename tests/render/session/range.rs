@@ -4,12 +4,13 @@ use super::*;
 
 #[test]
 fn datasets_that_cannot_be_rendered_say_why() {
+    let refusal = |data: &Dataset| Setup::new(data).err().unwrap().to_string();
     let mut data = half_space_of(2);
-    assert!(matches!(Setup::new(&data).err(), Some(SetupError::NoScene)));
+    assert!(refusal(&data).contains("holds no scene"));
     data.scene = "name = 3".into();
-    assert!(matches!(Setup::new(&data).err(), Some(SetupError::Scene(_))));
+    assert!(refusal(&data).starts_with("the scene in the dataset: scene:1"));
     data.scene = include_str!("../../scenes/sphere.toml").into();
-    assert!(matches!(Setup::new(&data).err(), Some(SetupError::Joints { grid: 2, chain: 3 })));
+    assert!(refusal(&data).contains("has 2 axes and the proxy of its scene 3 joints"));
 }
 
 #[test]

@@ -11,7 +11,8 @@ use haptize::{
     contact::{Model, Solver, Status},
     gpu::{Context, GpuError},
     object::Object,
-    scene::{ContactLaw, ContactSpec, SpringKind},
+    paper::PaperSolver,
+    scene::SpringKind,
 };
 use rayon::prelude::*;
 use std::{
@@ -203,7 +204,7 @@ fn combination(
     let chains = [floating_bar(0.0), floating_bar(BALL)];
     for (radius, chain) in chains.iter().enumerate() {
         let mut model = Model::new(object, chain, contact_of(chain, 1.0));
-        let mut paper = Model::new(object, chain, ContactSpec { law: ContactLaw::Paper, ..contact(1.0) });
+        let mut paper = Model::new(object, chain, contact(1.0));
         for (depth, (from, to, _)) in DEPTHS.into_iter().enumerate() {
             let configurations = pressed(&model, 1, count, from * RADIUS, to * RADIUS);
             for (k, &stiffness) in stiffnesses.iter().enumerate() {
@@ -259,14 +260,14 @@ fn combination(
     Ok(())
 }
 
-/// The model on a tenth of the configurations.
+/// The paper's iteration on a tenth of the configurations.
 fn tenth(model: &Model<'_>, configurations: &[JointVector]) -> Share {
-    let solve = |solver: &mut Solver<'_>, q: &JointVector| {
+    let solve = |solver: &mut PaperSolver<'_>, q: &JointVector| {
         let since = Instant::now();
         let converged = solver.solve(q).status == Status::Contact;
         Share::of(converged, since.elapsed())
     };
-    let shares: Vec<_> = configurations.par_iter().step_by(10).map_init(|| Solver::new(model), solve).collect();
+    let shares: Vec<_> = configurations.par_iter().step_by(10).map_init(|| PaperSolver::new(model), solve).collect();
     let mut sum = Share::default();
     shares.into_iter().for_each(|share| sum += share);
     sum

@@ -2,11 +2,11 @@
 
 use super::{Target, mutate, outcome, shipped, write};
 use crate::objects;
-use glam::DVec3;
 use haptize::{
     object::Object,
     scene::{
-        ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SpringKind, SpringSpec,
+        ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Placement, Shape, SpringKind,
+        SpringSpec,
     },
     urdf::{self, Arm, Robot, UrdfError},
 };
@@ -17,12 +17,9 @@ fn mesh(file: &Path, input: &[u8], refine: Option<f64>, material: Material) -> S
     write(file, input);
     let file = file.to_path_buf();
     let tetrahedra = file.extension().is_some_and(|extension| extension == "msh");
-    let (scale, centre) = (0.1, DVec3::ZERO);
-    let shape = if tetrahedra {
-        Shape::Tetrahedra { file, scale, centre }
-    } else {
-        Shape::Mesh { file, scale, centre, refine }
-    };
+    let placement = Placement { scale: 0.1, ..Placement::METRES };
+    let shape =
+        if tetrahedra { Shape::Tetrahedra { file, placement } } else { Shape::Mesh { file, placement, refine } };
     let ground = Some(GroundSpec { stiffness: GroundStiffness::PerNode(10.0), nodes: GroundNodes::All });
     outcome(Object::build(&ObjectSpec { shape, material, skin: None, ground, node_mass: 0.01, node_damping: 0.1 }))
 }

@@ -15,15 +15,15 @@
 //! soon as a pass repeats an earlier one to the last bit (Brent 1980: compared with the pass of the last power of two).
 //! A node with a radius, which the paper does not have, acts through its deepest point x_i - r_i N_i.
 
-use super::energy::RESIDUAL_FLOOR;
-use super::energy::SolverStats;
+use crate::contact::RESIDUAL_FLOOR;
 use crate::contact::detection::Detection;
+use crate::contact::equilibrium::energy::SolverStats;
 use crate::contact::geometry::LENGTH_ROUNDING;
 use crate::contact::geometry::normals;
 use crate::contact::law::depth::Contact;
 use crate::contact::linear::cholesky;
 use crate::contact::linear::support::{Support, dot, root};
-use crate::contact::model::{Model, MotionBound};
+use crate::contact::{Model, MotionBound};
 use glam::DVec3;
 
 /// A proxy node tied to its three closest object nodes.

@@ -1,14 +1,18 @@
-//! The paper's results, remade: its procedure as a drawing (Fig. 2), the specimen (Fig. 7), and its numbers beside
-//! ours.
+//! The paper's own method, and its results remade: the iteration of section 2.1 with a sweep of it, the procedure as a
+//! drawing (Fig. 2), the specimen (Fig. 7), and the paper's numbers beside ours. Nothing else solves by the iteration:
+//! it is one more [`Backend`](crate::contact::Backend).
 //!
-//! The other figures are those of any dataset and session: [`space`](super::space) (Fig. 3),
-//! [`gridized`](super::gridized) (Fig. 4), [`press`](super::press) (Figs. 5 and 9), [`object`](super::object) (Fig. 6)
-//! and [`force`](super::force) (Fig. 8).
+//! The other figures are those of any dataset and session: [`space`](crate::report::space) (Fig. 3),
+//! [`gridized`](crate::report::gridized) (Fig. 4), [`press`](crate::report::press) (Figs. 5 and 9),
+//! [`object`](crate::report::object) (Fig. 6) and [`force`](crate::report::force) (Fig. 8).
 
+mod backend;
 mod comparison;
+mod iteration;
 mod procedure;
 mod specimen;
 
+pub use backend::{PaperBackend, PaperSolver, baked, haptize};
 pub use comparison::{Comparison, FIGURES, FigureNote, Row, Value};
 pub use procedure::procedure;
 pub use specimen::specimen;

@@ -1,0 +1,123 @@
+//! What failed: one sentence that names the place, the problem and the remedy, and a kind where code asks for it.
+
+use crate::{input, memory::Shortage};
+use std::{
+    fmt::Display,
+    io,
+    path::{Path, PathBuf},
+};
+
+/// Work failed.
+///
+/// Its text names the place first (a file, a line of it), then the problem, then what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{text}")]
+pub struct Error {
+    kind: ErrorKind,
+    location: Option<Location>,
+    text: String,
+}
+
+/// Kinds of errors that a program answers differently.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// Any other: the text says all.
+    Other,
+    /// The system refuses to read or to write a file.
+    File,
+    /// A file is not of the kind that was asked for.
+    Foreign,
+    /// A dataset is damaged, of another version, or lacks what is asked of it.
+    Dataset,
+    /// A scene is not valid.
+    Scene,
+    /// Work was stopped from outside.
+    Stopped,
+    /// A matrix that has to be positive definite is not.
+    Indefinite,
+}
+
+/// Where an error lies.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Location {
+    /// The file.
+    pub path: PathBuf,
+    /// Line and column in it, from one, where they are known.
+    pub line: Option<(usize, usize)>,
+}
+
+impl Error {
+    /// Returns the error that `text` tells.
+    pub fn new(text: impl Into<String>) -> Self {
+        Self { kind: ErrorKind::Other, location: None, text: text.into() }
+    }
+
+    /// Returns what is wrong with the file at `path`.
+    pub(crate) fn at(path: &Path, what: impl Display) -> Self {
+        Self::new(format!("{}: {what}", path.display())).in_file(path, None)
+    }
+
+    /// Returns what is wrong with a line, counted from one, of the file at `path`.
+    pub(crate) fn on_line(path: &Path, line: u64, what: impl Display) -> Self {
+        Self::new(format!("{}:{line}: {what}", path.display())).in_file(path, Some((line as usize, 1)))
+    }
+
+    /// Returns that the file at `path` cannot be read, and what to do.
+    pub(crate) fn unreadable(path: &Path, source: &io::Error) -> Self {
+        Self::at(path, format_args!("cannot be read: {}", input::remedied(source))).of(ErrorKind::File)
+    }
+
+    /// Returns the same error, which lies at a line and column of the file at `path`, where they are known.
+    pub(crate) fn in_file(self, path: impl Into<PathBuf>, line: Option<(usize, usize)>) -> Self {
+        Self { location: Some(Location { path: path.into(), line }), ..self }
+    }
+
+    /// Returns the same error, of another kind.
+    pub(crate) fn of(self, kind: ErrorKind) -> Self {
+        Self { kind, ..self }
+    }
+
+    /// Returns the same error; its text says first what it befell.
+    pub(crate) fn within(self, context: impl Display) -> Self {
+        Self { text: format!("{context}: {}", self.text), ..self }
+    }
+
+    /// Returns its kind.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
+    /// Returns where it lies, where that is a file.
+    #[must_use]
+    pub fn location(&self) -> Option<&Location> {
+        self.location.as_ref()
+    }
+}
+
+impl From<String> for Error {
+    fn from(text: String) -> Self {
+        Self::new(text)
+    }
+}
+
+impl From<&str> for Error {
+    fn from(text: &str) -> Self {
+        Self::new(text)
+    }
+}
+
+impl From<Shortage> for Error {
+    fn from(shortage: Shortage) -> Self {
+        Self::new(shortage.to_string())
+    }
+}
+
+/// Makes an [`Error`] of a sentence, as `format!` does.
+macro_rules! error {
+    ($($text:tt)*) => {
+        $crate::Error::new(format!($($text)*))
+    };
+}
+pub(crate) use error;

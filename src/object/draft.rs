@@ -1,0 +1,135 @@
+//! A body from a mesh file as the table of a scene, for a start: an elastic solid under a skin, lying on the ground.
+
+use super::{import, topology};
+use crate::Error;
+use crate::scene::Placement;
+use crate::toml_text::{coarse, entry, number, vector};
+use glam::DVec3;
+use std::fmt::{self, Write};
+use std::path::Path;
+
+/// Density of a body: water's (kg/m^3).
+const DENSITY: f64 = 1000.0;
+
+/// Damping over mass (1/s): a free node comes to rest in some hundredths of a second.
+const DAMPING: f64 = 100.0;
+
+/// Width over which a skin rounds dents, in edges of the mesh (1): from three on the mesh is hardly felt
+/// (docs/accuracy.md).
+const SKIN_WIDTH: f64 = 3.0;
+
+/// Poisson's ratio of soft tissue that may swell to the sides (1): nearer to 1/2 a body is stiffer, and takes smaller
+/// elements.
+const POISSON: f64 = 0.45;
+
+/// Height up to which a body is held, over its own (1): the part on which it lies.
+const HELD: f64 = 0.1;
+
+/// Longest body that is taken to be given in metres where no unit is named (m).
+const LONGEST: f64 = 2.0;
+
+/// Unit of length of a mesh file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LengthUnit {
+    /// Metres.
+    M,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+    /// Inches.
+    In,
+}
+
+impl LengthUnit {
+    /// (m)
+    #[must_use]
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Cm => 0.01,
+            Self::Mm => 0.001,
+            Self::In => 0.0254,
+        }
+    }
+}
+
+/// A body as a scene has it.
+#[derive(Clone, Debug)]
+pub struct Draft {
+    /// The table `[object]` with its parts; the box around the body is centred at the origin.
+    pub tables: String,
+    /// Unit of the file's coordinates, which was given or follows from the size of the body.
+    pub unit: LengthUnit,
+}
+
+impl Draft {
+    /// The surface in `file`, which the scene calls `name`, of Young's modulus `young` (Pa), turned about x, then y, then
+    /// z (rad).
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn new(file: &Path, name: &str, unit: Option<LengthUnit>, turn: DVec3, young: f64) -> Result<Self, Error> {
+        let (nodes, triangles) = import::read(file, &Placement::METRES, &mut Vec::new())?;
+        let unit = unit.unwrap_or(if import::length(&nodes) > LONGEST { LengthUnit::Mm } else { LengthUnit::M });
+        let scale = unit.metres();
+        let nodes = Placement { scale, turn, centre: DVec3::ZERO }.place(nodes);
+        let [low, high] = import::corners(&nodes);
+        let corner = |node: u32| nodes.get(node as usize).copied().unwrap_or_default();
+        let volumes = triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(corner);
+            a.dot(b.cross(c)) / 6.0
+        });
+        let volume = volumes.sum::<f64>().abs();
+        let mass = DENSITY * volume / nodes.len().max(1) as f64;
+        let width = SKIN_WIDTH * topology::mean_edge(&nodes, &triangles);
+        let body =
+            Body { name, scale, turn, young, middle: 0.5 * (low + high), height: high.z - low.z, volume, mass, width };
+        let mut tables = String::new();
+        // Writing to a string fails only where memory does.
+        let _ = body.write(&mut tables);
+        Ok(Self { tables, unit })
+    }
+}
+
+/// What is known of a body.
+struct Body<'a> {
+    name: &'a str,
+    scale: f64,
+    turn: DVec3,
+    young: f64,
+    /// Of the box around it, its height (m), and its volume (m^3).
+    middle: DVec3,
+    height: f64,
+    volume: f64,
+    /// Of a node (kg).
+    mass: f64,
+    /// Of the skin (m).
+    width: f64,
+}
+
+impl Body<'_> {
+    fn write(&self, text: &mut String) -> fmt::Result {
+        writeln!(text, "[object]")?;
+        let meaning = format!("kg, of each node: the body has {} l, as heavy as water", coarse(1e3 * self.volume));
+        entry(text, "node_mass", &coarse(self.mass), &meaning)?;
+        entry(text, "node_damping", &coarse(DAMPING * self.mass), "N s/m, against the ground")?;
+        writeln!(text, "\n[object.mesh]")?;
+        entry(text, "file", &toml::Value::from(self.name).to_string(), "relative to this file")?;
+        entry(text, "scale", &number(self.scale, 4), "to metres")?;
+        if self.turn != DVec3::ZERO {
+            entry(text, "turn", &vector(self.turn, 6), "rad, about x, then y, then z")?;
+        }
+        entry(text, "centre", &vector(-self.middle, 6), "m, where the file's origin lies")?;
+        writeln!(text, "\n[object.elasticity]")?;
+        entry(text, "young", &format!("{:?}", self.young), "Pa")?;
+        entry(text, "poisson", &number(POISSON, 3), "")?;
+        writeln!(text, "\n[object.skin]")?;
+        let meaning = "m, over which the dent of a point is rounded: three edges of the mesh";
+        entry(text, "width", &number(self.width, 5), meaning)?;
+        writeln!(text, "\n[object.ground]")?;
+        entry(text, "clamp", "true", "the body lies on something")?;
+        entry(text, "below", &number((HELD - 0.5) * self.height, 5), "m, height up to which it is held")
+    }
+}

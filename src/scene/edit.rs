@@ -1,0 +1,169 @@
+//! Changes of a scene's text that leave its other lines, and their comments, as a person wrote them.
+
+use super::SceneError;
+use super::check::Checker;
+use glam::DVec3;
+use std::path::Path;
+use toml_edit::{DocumentMut, Item, Value};
+
+/// Text of a scene, to be changed.
+pub struct SceneText<'a> {
+    document: DocumentMut,
+    path: &'a Path,
+}
+
+impl<'a> SceneText<'a> {
+    /// The text of the scene at `path`.
+    ///
+    /// # Errors
+    /// When it is no TOML; the message names the line.
+    pub fn new(text: &str, path: &'a Path) -> Result<Self, SceneError> {
+        let document = text.parse().map_err(|error: toml_edit::TomlError| {
+            Checker { path, text }.error(error.span().unwrap_or(0..0), error.message())
+        })?;
+        Ok(Self { document, path })
+    }
+
+    /// Each table of `tables`, which are TOML, takes the place of the table of its name, or follows the others.
+    ///
+    /// # Errors
+    /// When `tables` are no TOML.
+    pub fn replace(&mut self, tables: &str) -> Result<(), SceneError> {
+        let new = Self::new(tables, self.path)?.document;
+        for (name, mut item) in new.into_table() {
+            let old = self.document.remove(&name);
+            if let Some(table) = item.as_table_mut() {
+                let old = old.as_ref().and_then(Item::as_table);
+                // Tables within it follow it.
+                table.set_position(old.and_then(toml_edit::Table::position));
+                set_positions(table);
+                let heading = old.and_then(|old| old.decor().prefix()).and_then(|prefix| prefix.as_str());
+                let own = table.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or_default();
+                if own.trim().is_empty() {
+                    table.decor_mut().set_prefix(heading.unwrap_or("\n").to_owned());
+                }
+            }
+            self.document.insert(&name, item);
+        }
+        Ok(())
+    }
+
+    /// Moves the object by `motion` (m): its centre, the height below which it is held, and its inclusions.
+    pub fn move_object(&mut self, motion: DVec3) {
+        let Some(object) = self.document.get_mut("object").and_then(Item::as_table_like_mut) else { return };
+        for shape in ["sphere", "mesh", "tetrahedra"] {
+            move_centre(object.get_mut(shape), motion);
+        }
+        if let Some(below) = object.get_mut("ground").and_then(|ground| ground.get_mut("below"))
+            && let Some(height) = number(below)
+        {
+            set(below, rounded(height + motion.z).into());
+        }
+        let Some(elasticity) = object.get_mut("elasticity") else { return };
+        let Some(inclusions) = elasticity.get_mut("inclusion") else { return };
+        let mut number = 0;
+        while let Some(inclusion) = inclusions.get_mut(number) {
+            move_centre(inclusion.get_mut("sphere"), motion);
+            number += 1;
+        }
+    }
+}
+
+/// Moves the key `centre` of a table, which is the origin where it is left out, by `motion` (m).
+fn move_centre(table: Option<&mut Item>, motion: DVec3) {
+    let Some(table) = table.and_then(Item::as_table_like_mut) else { return };
+    let centre = table.entry("centre").or_insert_with(|| Item::Value(Value::Array([0.0; 3].into_iter().collect())));
+    let old = |k: usize| centre.get(k).and_then(number).unwrap_or(0.0);
+    let moved = [0, 1, 2].map(|k| rounded(old(k) + motion[k]));
+    set(centre, Value::Array(moved.into_iter().collect()));
+}
+
+fn number(item: &Item) -> Option<f64> {
+    item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64))
+}
+
+/// Puts another value in the place of one; a comment behind it stays.
+fn set(item: &mut Item, mut value: Value) {
+    if let Some(old) = item.as_value() {
+        *value.decor_mut() = old.decor().clone();
+    }
+    *item = Item::Value(value);
+}
+
+/// Returns a length to a nanometre, which hides the rounding of a sum (m).
+fn rounded(length: f64) -> f64 {
+    (length * 1e9).round() / 1e9
+}
+
+impl std::fmt::Display for SceneText<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.document.fmt(f)
+    }
+}
+
+/// Lets the tables within `table` follow it in the order in which they are written.
+fn set_positions(table: &mut toml_edit::Table) {
+    for (_, item) in table.iter_mut() {
+        if let Some(inner) = item.as_table_mut() {
+            inner.set_position(None);
+            set_positions(inner);
+        }
+        for inner in item.as_array_of_tables_mut().into_iter().flat_map(|array| array.iter_mut()) {
+            inner.set_position(None);
+            set_positions(inner);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "name = \"a\" # mine\n\n# ---- The body\n[object] # soft\nnode_mass = 1.0\n[object.sphere]\n\
+        centre = [1.0, 2.0, 3.0] # m, here\nradius = 0.1\n\n# ---- The arm\n[proxy]\nbase = 1\n\n# ---- The grid\n\
+        [grid]\naxes = []\n";
+
+    fn edited(text: &str, tables: &str) -> String {
+        let mut edit = SceneText::new(text, Path::new("a.toml")).unwrap();
+        edit.replace(tables).unwrap();
+        edit.to_string()
+    }
+
+    #[test]
+    fn a_table_takes_the_place_of_its_like_under_the_heading_that_is_there() {
+        let expected = TEXT.replace("axes = []", "axes = [1]");
+        assert_eq!(edited(TEXT, "[grid]\naxes = [1]\n"), expected);
+        let object = "[object]\nnode_mass = 2.0\n\n[object.mesh]\nfile = \"b.obj\"\n\n[object.skin]\nwidth = 1.0\n";
+        let [begin, end] = ["[object]", "\n# ---- The arm"].map(|line| TEXT.find(line).unwrap());
+        assert_eq!(edited(TEXT, object), format!("{}{object}{}", &TEXT[..begin], &TEXT[end..]));
+        // One that is new follows the others, and values in one line are tables, too.
+        assert_eq!(edited(TEXT, "[motion]\npress = []\n"), format!("{TEXT}\n[motion]\npress = []\n"));
+        let inline = "grid = { axes = [] } # old\n[object]\nnode_mass = 1.0\n";
+        assert_eq!(edited(inline, "[grid]\naxes = [1]\n"), "[object]\nnode_mass = 1.0\n\n[grid]\naxes = [1]\n");
+    }
+
+    #[test]
+    fn an_object_moves_with_its_ground_and_its_inclusions_under_its_comments() {
+        let text = TEXT.replace(
+            "radius = 0.1\n",
+            "radius = 0.1\n[object.ground]\nbelow = -1 # m\n[object.elasticity]\ninclusion = [{ sphere = { centre = \
+             [0.0, 0.0, 0.1], radius = 1.0 } }]\n",
+        );
+        let mut edit = SceneText::new(&text, Path::new("a.toml")).unwrap();
+        edit.move_object(DVec3::new(-0.1, 0.2, 0.3));
+        let moved = text.replace("[1.0, 2.0, 3.0]", "[0.9, 2.2, 3.3]").replace("below = -1", "below = -0.7");
+        assert_eq!(edit.to_string(), moved.replace("[0.0, 0.0, 0.1]", "[-0.1, 0.2, 0.4]"));
+        // What is left out lies at the origin; a list of tables is one, too.
+        let text = "[object.mesh]\nfile = \"a.obj\"\n[[object.elasticity.inclusion]]\nsphere.centre = [1, 0, 0]\n";
+        let mut edit = SceneText::new(text, Path::new("a.toml")).unwrap();
+        edit.move_object(DVec3::X);
+        let moved = text.replace("obj\"\n", "obj\"\ncentre = [1.0, 0.0, 0.0]\n");
+        assert_eq!(edit.to_string(), moved.replace("[1, 0, 0]", "[2.0, 0.0, 0.0]"));
+    }
+
+    #[test]
+    fn what_is_no_toml_is_refused_with_its_line() {
+        let error = SceneText::new("name = \"a\"\n[object\n", Path::new("a.toml")).err().unwrap().to_string();
+        assert!(error.starts_with("a.toml:2:"), "{error}");
+    }
+}
