@@ -1,6 +1,6 @@
 //! What failed: one sentence that names the place, the problem and the remedy, and a kind where code asks for it.
 
-use crate::{input, memory::Shortage};
+use crate::{input, memory::Shortage, names};
 use std::{
     fmt::Display,
     io,
@@ -55,12 +55,12 @@ impl Error {
 
     /// Returns what is wrong with the file at `path`.
     pub(crate) fn at(path: &Path, what: impl Display) -> Self {
-        Self::new(format!("{}: {what}", path.display())).in_file(path, None)
+        Self::new(format!("{}: {what}", shown(path))).in_file(path, None)
     }
 
     /// Returns what is wrong with a line, counted from one, of the file at `path`.
     pub(crate) fn on_line(path: &Path, line: u64, what: impl Display) -> Self {
-        Self::new(format!("{}:{line}: {what}", path.display())).in_file(path, Some((line as usize, 1)))
+        Self::new(format!("{}:{line}: {what}", shown(path))).in_file(path, Some((line as usize, 1)))
     }
 
     /// Returns that the file at `path` cannot be read, and what to do.
@@ -94,6 +94,11 @@ impl Error {
     pub fn location(&self) -> Option<&Location> {
         self.location.as_ref()
     }
+}
+
+/// Returns a path that may be printed in a line: a file's name may hold an end of one.
+fn shown(path: &Path) -> String {
+    names::escaped(&path.to_string_lossy()).into_owned()
 }
 
 impl From<String> for Error {

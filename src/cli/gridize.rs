@@ -5,13 +5,13 @@ use super::{
     bar::Bar,
     output::{self, Content, Folder, Overwritten, Replaced},
     report::{self, Describe, Report, Text},
-    watch,
+    tell, watch,
 };
 use crate::{
     Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
-        GridizeOptions, GridizeReport, History, Interpolation, Past, Samples, gridize, gridize_remembering,
+        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Samples, gridize, gridize_remembering,
         predict_histories,
         prediction::{Prediction, held_out, predict},
     },
@@ -102,7 +102,7 @@ pub struct Source {
     branches: Option<([Samples; 2], usize)>,
     left_out: usize,
     /// What tells how the object relaxes, where something does.
-    past: Option<(Vec<History>, Past)>,
+    past: Option<(Vec<ForceHistory>, Past)>,
     /// Friction of the object, and the arm and its node that felt it.
     friction: Option<(IdentifiedFriction, Chain, usize)>,
 }
@@ -201,7 +201,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         of: source.of,
         axes: dataset.grid.axes,
     };
-    Report::new(&gridized)
+    if gridized.report.contact_points == 0 {
+        tell(format_args!(
+            "haptize: nothing touches: no torque is above the threshold at any grid point; check the units of the log, or \
+             lower --epsilon"
+        ));
+    }
+    Report::of(&gridized, gridized.report.contact_points > 0)
 }
 
 /// Measurements made a dataset.

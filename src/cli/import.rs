@@ -1,10 +1,11 @@
 //! `haptize import`: a robot's file becomes a scene.
 
 use super::{
-    Failure,
+    Failure, output as files,
     report::{Describe, Report, Text},
     shell, tell,
 };
+use crate::dataset::replace_file;
 use crate::names::escaped;
 use crate::urdf::{self, Arm, ArmJoint, Lock, Robot};
 use serde::{Serialize, Serializer};
@@ -116,13 +117,16 @@ fn command(arguments: &Arguments) -> String {
 
 /// Writes a new file. A scene that is there may hold the work of a person, and is left as it is.
 fn write(output: &Path, scene: &str) -> Result<(), Failure> {
+    if files::is_forced() {
+        return Ok(replace_file(output, |file| file.write_all(scene.as_bytes()))?);
+    }
     let failed =
         |error: std::io::Error| -> Failure { format!("{}: cannot be written: {error}", output.display()).into() };
     let mut file = match OpenOptions::new().write(true).create_new(true).open(output) {
         Ok(file) => file,
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
             return Err(format!(
-                "{}: there is a file already; nothing is written: name another file",
+                "{}: there is a file already; nothing is written: name another file, or replace it with --force",
                 output.display()
             )
             .into());

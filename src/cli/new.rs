@@ -1,7 +1,7 @@
 //! `haptize new`: a commented scene to begin with, one of those that are part of the program.
 
 use super::{
-    Failure,
+    Failure, output,
     report::{Describe, Report, Text},
     shell,
 };
@@ -122,6 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             Ok(there) if there.is_file() && std::fs::read(path).is_ok_and(|found| found == text.as_bytes()) => {
                 Ok(false)
             }
+            Ok(there) if there.is_file() && output::is_forced() => Ok(true),
             Ok(_) => Err(taken(path)),
         }
     };
@@ -150,7 +151,11 @@ impl Describe for Written {
 }
 
 fn taken(path: &Path) -> Failure {
-    format!("{}: this file exists already, and nothing is written: name another by -o", path.display()).into()
+    format!(
+        "{}: this file exists already, and nothing is written: name another by -o, or replace it with --force",
+        path.display()
+    )
+    .into()
 }
 
 #[cfg(test)]

@@ -34,6 +34,11 @@ pub fn force() {
     FORCED.store(true, Ordering::Relaxed);
 }
 
+/// Whether a file is replaced whoever wrote it.
+pub fn is_forced() -> bool {
+    FORCED.load(Ordering::Relaxed)
+}
+
 /// What a file of haptize holds. One is replaced by its like alone, since not all of them can be made again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {

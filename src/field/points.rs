@@ -7,7 +7,7 @@ use crate::{
     contact::Status,
     dataset::{Dataset, Grid},
     input::GREATEST_INPUT,
-    joint_matrix,
+    joint_matrix, memory,
 };
 use std::collections::VecDeque;
 
@@ -124,6 +124,9 @@ impl<'a> Checked<'a> {
         if let Some(contacts) = &dataset.contacts {
             expect("contact offsets", count + 1, contacts.offsets.len())?;
         }
+        // Facts of each point and the number of another, and what is found from these beside them.
+        memory::check(count.saturating_mul(2 * (size_of::<Point>() + size_of::<usize>())))
+            .map_err(|shortage| unfit(format!("the dataset's {count} grid points: {shortage}")))?;
         let mut points: Vec<Point> = (0..count).map(|point| Point::of(dataset, point)).collect();
         let nearest = nearest_present(grid, &points)
             .ok_or_else(|| unfit("no grid point of the dataset was computed: finish the bake first"))?;

@@ -39,7 +39,7 @@ const HELD_OUT: usize = 4;
 
 /// A stretch of time in which configuration and torque were recorded.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct History {
+pub struct ForceHistory {
     /// (s), ascending.
     pub times: Vec<f64>,
     /// Joint fastest (rad or m).
@@ -66,7 +66,7 @@ pub enum Past {
 /// Those of [`gridize`]; when no history lies inside the grid, and when a log shows no relaxation.
 pub fn gridize_remembering(
     samples: &Samples,
-    (histories, past): (&[History], Past),
+    (histories, past): (&[ForceHistory], Past),
     options: &GridizeOptions,
 ) -> Result<(Dataset, GridizeReport), Error> {
     let scaled = past == Past::Presses;
@@ -106,7 +106,7 @@ pub fn gridize_remembering(
 ///
 /// # Errors
 /// When the dataset has no energy.
-pub fn predict_histories(dataset: &Dataset, histories: &[History]) -> Result<f64, Error> {
+pub fn predict_histories(dataset: &Dataset, histories: &[ForceHistory]) -> Result<f64, Error> {
     let terms = dataset.provenance.relaxation.as_ref().map_or(&[][..], |relaxation| &relaxation.terms);
     Ok(misfit(&stretches(dataset, histories)?, terms, false))
 }
@@ -125,13 +125,13 @@ fn scale(dataset: &mut Dataset, scale: f64) {
 }
 
 /// The histories as the potential of `dataset` has them.
-fn stretches(dataset: &Dataset, histories: &[History]) -> Result<Vec<Stretch>, Error> {
+fn stretches(dataset: &Dataset, histories: &[ForceHistory]) -> Result<Vec<Stretch>, Error> {
     let joints = dataset.grid.joints();
     let mut slopes = JointVector::zeros(joints);
     slopes.fill(1.0);
     let field = TorqueField::interpolated(dataset, Interpolation::Potential, THRESHOLD, &slopes);
     let field = field.map_err(|error| error.within("the gridized torque cannot be interpolated"))?;
-    let of = |history: &History| {
+    let of = |history: &ForceHistory| {
         let mut stretch =
             Stretch { times: history.times.clone(), counts: history.counts.clone(), ..Stretch::default() };
         let mut inside = Vec::new();
@@ -152,7 +152,7 @@ fn stretches(dataset: &Dataset, histories: &[History]) -> Result<Vec<Stretch>, E
 
 /// One sample for each cell of the grid that a history goes through: the mean torque without memory, which left the
 /// share `left` of each row, weighted by that share's square as noise is.
-fn fresh(joints: &[JointLabel], histories: &[History], left: &[Vec<f64>], steps: &[f64]) -> Samples {
+fn fresh(joints: &[JointLabel], histories: &[ForceHistory], left: &[Vec<f64>], steps: &[f64]) -> Samples {
     let count = joints.len();
     let mut cells: BTreeMap<[i64; MAX_JOINTS], (f64, Vec<f64>)> = BTreeMap::new();
     for (number, history) in histories.iter().enumerate() {
@@ -217,9 +217,9 @@ mod tests {
 
     /// A log of steps to 0.2, 0.4 up to 1.0 rad at `speed`, each held for 60 s; torque on the arm, an exponential spring's
     /// with the loop's memory, z by small steps.
-    fn log(speed: f64) -> History {
+    fn log(speed: f64) -> ForceHistory {
         const STEP: f64 = 0.01;
-        let (mut q, mut z, mut history) = (0.0_f64, [0.0; 2], History::default());
+        let (mut q, mut z, mut history) = (0.0_f64, [0.0; 2], ForceHistory::default());
         let mut time = 0.0;
         for level in 1..=5 {
             let held = f64::from(level) * 0.2;

@@ -25,7 +25,7 @@ mod smooth;
 mod space;
 mod tetrahedra;
 
-pub use memory::{History, Past, gridize_remembering, predict_histories};
+pub use memory::{ForceHistory, Past, gridize_remembering, predict_histories};
 pub use samples::Samples;
 
 use crate::{

@@ -1,7 +1,7 @@
 //! The relaxation of an object, identified from stretches of time in which its torque was recorded.
 //!
 //! With the terms' shares g_i and times theta_i the loop's torque is the elastic one times `1 - sum g_i z_i / w`,
-//! `z_i' = (w - z_i) / theta_i`, w the root of the elastic energy ([`crate::render`]'s relaxation). So it is linear in the
+//! `z_i' = (w - z_i) / theta_i`, w the root of the elastic energy (relaxation.rs of the loop). So it is linear in the
 //! shares where the times are given:
 //!
 //! `tau = s tau_e - sum (s g_i) (z_i / w) tau_e`,

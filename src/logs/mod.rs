@@ -23,7 +23,7 @@ pub use units::ColumnUnit;
 
 use crate::{
     Error, JointVector, error,
-    gridize::{History, Samples},
+    gridize::{ForceHistory, Samples},
     input,
     ros::{JointStateTable, is_mcap},
 };
@@ -118,7 +118,7 @@ pub struct Imported {
     /// Both branches, moving forward and backward, where rows were averaged by direction.
     pub branches: Option<[Samples; 2]>,
     /// Every row with its time, a segment each, where the mapping says that the object relaxes.
-    pub histories: Vec<History>,
+    pub histories: Vec<ForceHistory>,
     /// Report of the import.
     pub report: ImportReport,
 }
@@ -186,7 +186,7 @@ struct Import<'a> {
     block: Block,
     cells: Cells,
     samples: Samples,
-    histories: Vec<History>,
+    histories: Vec<ForceHistory>,
     report: ImportReport,
 }
 
@@ -227,7 +227,7 @@ impl<'a> Import<'a> {
             block: Block::new(joints),
             cells: Cells::new(&mapping.torque.cell),
             samples: Samples { joints: mapping.labels(), ..Samples::default() },
-            histories: vec![History::default()],
+            histories: vec![ForceHistory::default()],
             report: ImportReport::default(),
         }
     }
@@ -283,7 +283,7 @@ impl<'a> Import<'a> {
         self.end_block()?;
         self.cells.end_visit();
         if self.histories.last().is_some_and(|history| !history.times.is_empty()) {
-            self.histories.push(History::default());
+            self.histories.push(ForceHistory::default());
         }
         Ok(())
     }

@@ -77,12 +77,9 @@ pub(super) fn suitable_size(nodes: &[DVec3], edge: f64) -> f64 {
 }
 
 impl Lattice {
-    /// Fills the closed surface with cubes of `size` (m). `points`: on all of the surface, so that each has a cube.
-    ///
-    /// # Errors
-    /// When there would be too many.
-    pub fn fill(nodes: &[DVec3], triangles: &[[u32; 3]], size: f64, points: &[SurfacePoint]) -> Result<Self, Error> {
-        let mut lattice = Self::around(nodes, size)?;
+    /// Fills the closed surface with the cubes. `points`: on all of the surface, so that each has a cube.
+    pub fn fill(mut self, nodes: &[DVec3], triangles: &[[u32; 3]], points: &[SurfacePoint]) -> Self {
+        let lattice = &mut self;
         let mut facing = vec![DVec3::ZERO; lattice.numbers.len()];
         for point in points {
             facing[lattice.number(lattice.place(point).0)] += point.area * point.normal.abs();
@@ -106,7 +103,7 @@ impl Lattice {
                 let known = &mut numbers[((node.x * most.y + node.y) * most.z + node.z) as usize];
                 if *known == ABSENT {
                     *known = lattice.nodes.len() as u32;
-                    lattice.nodes.push(lattice.origin + 0.5 * size * node.as_dvec3());
+                    lattice.nodes.push(lattice.origin + 0.5 * lattice.size * node.as_dvec3());
                 }
                 *known
             });
@@ -115,10 +112,14 @@ impl Lattice {
             let inside = (!whole(&stretches)).then_some(stretches);
             lattice.cubes.push(Cube { at, nodes, axis: axes[number], inside });
         }
-        Ok(lattice)
+        self
     }
 
-    fn around(nodes: &[DVec3], size: f64) -> Result<Self, Error> {
+    /// Cubes of `size` over the box around `nodes` (m), none of them in the solid yet.
+    ///
+    /// # Errors
+    /// When there are too many.
+    pub fn around(nodes: &[DVec3], size: f64) -> Result<Self, Error> {
         let low = nodes.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = nodes.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         // A whole number of cubes, however it is rounded, is that number.

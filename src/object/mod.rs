@@ -178,8 +178,9 @@ impl Object {
         let elements: Option<Box<dyn Elements>> = match &spec.material {
             Material::Elastic(elastic) if body.tetrahedra.is_empty() => {
                 let cell = elastic.cell.unwrap_or_else(|| lattice::suitable_size(shell, edge));
+                let lattice = Lattice::around(shell, cell)?;
                 points = attachment::surface_points(shell, &body.triangles, lattice::POINT_SPACING * cell);
-                Some(Box::new(Lattice::fill(shell, &body.triangles, cell, &points)?))
+                Some(Box::new(lattice.fill(shell, &body.triangles, &points)))
             }
             Material::Elastic(_) => Some(Box::new(Tetrahedra::new(&body))),
             _ => None,
@@ -270,7 +271,7 @@ const MAX_NODES: usize = 1 << 20;
 fn check_count(nodes: usize) -> Result<(), Error> {
     if nodes > MAX_NODES {
         return Err(error!(
-            "an object of {nodes} nodes is more than the {MAX_NODES} that are taken: use a coarser surface"
+            "an object of {nodes} nodes is more than the {MAX_NODES} that are taken: use a coarser surface, or a larger object.elasticity.cell"
         ));
     }
     let needed = nodes * LEAST_BYTES_PER_NODE;

@@ -26,9 +26,10 @@ impl Course {
     /// When the file cannot be read, the topic is not there or not unique, a message is none, or none names
     /// all the joints.
     pub fn read(path: &Path, topic: Option<&str>, joints: &[String]) -> Result<Self, Error> {
+        let topics = super::topics(path)?;
         let topic = match topic {
-            None if super::topics(path)?.iter().any(|topic| topic.name == HAND_TOPIC) => HAND_TOPIC.to_owned(),
-            topic => table::chosen(path, topic)?,
+            None if topics.iter().any(|topic| topic.name == HAND_TOPIC) => HAND_TOPIC.to_owned(),
+            topic => table::chosen(path, &topics, topic)?,
         };
         let mut course = Self { topic, ..Self::default() };
         let (mut rows, mut stamped, mut number, mut names) = (Vec::new(), false, 0, Vec::new());

@@ -2,6 +2,7 @@
 
 use super::cdr::{Decoder, Encoder};
 use crate::names;
+use std::collections::HashSet;
 
 /// Text of the message's definition, as MCAP files carry it. Field names and types are those of ROS 2.
 pub(super) const SCHEMA: &str = "\
@@ -70,6 +71,11 @@ impl JointState {
             effort: decoder.f64s()?,
         };
         state.names.iter().try_for_each(|name| names::check(name))?;
+        let mut known = HashSet::new();
+        if let Some(twice) = state.names.iter().find(|name| !known.insert(name.as_str())) {
+            let remedy = "give each joint a name of its own where they are published";
+            return Err(format!("the name \"{twice}\" stands twice in it: {remedy}"));
+        }
         for (what, values) in
             [("positions", &state.position), ("velocities", &state.velocity), ("efforts", &state.effort)]
         {
@@ -169,6 +175,8 @@ mod tests {
         }
         let odd = JointState { effort: vec![1.0], ..golden() };
         assert!(JointState::decode(&odd.encode()).unwrap_err().contains("1 efforts for 2 names"));
+        let twice = JointState { names: vec!["a".into(), "b".into(), "a".into()], ..JointState::default() };
+        assert!(JointState::decode(&twice.encode()).unwrap_err().contains("\"a\" stands twice"));
         for name in ["a\nb", "a\u{2028}", "\u{202e}a"] {
             let odd = JointState { names: vec!["j1".into(), name.into()], ..golden() };
             let why = JointState::decode(&odd.encode()).unwrap_err();

@@ -41,7 +41,50 @@ pub fn topics(path: &Path) -> Result<Vec<Topic>, Error> {
     Ok(counts.into_iter().map(|(name, messages)| Topic { name, messages }).collect())
 }
 
-/// The table of one topic; reading it gives the text.
+/// What the messages of a topic tell together.
+#[derive(Default)]
+struct Survey {
+    messages: u64,
+    joints: Vec<String>,
+    /// Number of each joint.
+    numbers: BTreeMap<String, usize>,
+    stamped: bool,
+    has_effort: bool,
+    /// The first message that is no joint state, by its number from one, and why.
+    refused: Option<(u64, String)>,
+}
+
+impl Survey {
+    /// Takes a message in.
+    fn take(&mut self, bytes: &[u8]) {
+        self.messages += 1;
+        if self.refused.is_some() {
+            return;
+        }
+        match JointState::decode(bytes) {
+            Err(what) => self.refused = Some((self.messages, what)),
+            Ok(state) => self.add(state),
+        }
+    }
+
+    fn add(&mut self, state: JointState) {
+        self.stamped |= state.stamp > 0;
+        self.has_effort |= state.effort.iter().any(|effort| effort.is_finite());
+        for joint in state.names.into_iter().filter(|joint| !joint.trim().is_empty()) {
+            if !self.numbers.contains_key(&joint) {
+                self.numbers.insert(joint.clone(), self.joints.len());
+                self.joints.push(joint);
+            }
+        }
+        if self.joints.len() > MOST_JOINTS {
+            let what = format!("its messages name more than {MOST_JOINTS} joints");
+            self.refused = Some((self.messages, what));
+        }
+    }
+}
+
+/// The table of one topic; reading it gives the text. The file is read twice: what its messages tell together names the
+/// columns, and then each message is a row.
 pub struct JointStateTable {
     messages: Messages,
     topic: String,
@@ -60,27 +103,17 @@ impl JointStateTable {
     /// # Errors
     /// When the file cannot be read, the topic is not there or not unique, or a message is none.
     pub fn open(path: &Path, topic: Option<&str>) -> Result<Self, Error> {
-        let topic = chosen(path, topic)?;
-        let (mut joints, mut numbers, mut stamped, mut number) = (Vec::new(), BTreeMap::new(), false, 0);
-        let mut has_effort = false;
+        let mut surveys: BTreeMap<String, Survey> = BTreeMap::new();
         for message in Messages::open(path)? {
             let (name, _, bytes) = message?;
-            if name == topic {
-                number += 1;
-                let state = decode(path, &topic, number, &bytes)?;
-                stamped |= state.stamp > 0;
-                has_effort |= state.effort.iter().any(|effort| effort.is_finite());
-                for joint in state.names.into_iter().filter(|joint| !joint.trim().is_empty()) {
-                    if !numbers.contains_key(&joint) {
-                        numbers.insert(joint.clone(), joints.len());
-                        joints.push(joint);
-                    }
-                }
-                if joints.len() > MOST_JOINTS {
-                    let what = format!("its messages name more than {MOST_JOINTS} joints");
-                    return Err(no_state(path, &topic, number, &what));
-                }
-            }
+            surveys.entry(name).or_default().take(&bytes);
+        }
+        let count = |(name, survey): (&String, &Survey)| Topic { name: name.clone(), messages: survey.messages };
+        let topic = chosen(path, &surveys.iter().map(count).collect::<Vec<_>>(), topic)?;
+        let Survey { messages, joints, numbers, stamped, has_effort, refused } =
+            surveys.remove(&topic).unwrap_or_default();
+        if let Some((number, what)) = refused {
+            return Err(no_state(path, &topic, number, &what));
         }
         if joints.is_empty() {
             let what = format!("no message of {topic} names a joint: give the joints names where they are published");
@@ -88,7 +121,7 @@ impl JointStateTable {
         }
         if !has_effort {
             let what = format!(
-                "none of the {number} messages of {topic} gives an effort, and a torque is made of it: record from a \
+                "none of the {messages} messages of {topic} gives an effort, and a torque is made of it: record from a \
                  driver that publishes efforts"
             );
             return Err(Error::at(path, what));
@@ -170,16 +203,15 @@ pub(super) fn no_state(path: &Path, topic: &str, number: u64, what: &str) -> Err
     Error::at(path, format_args!("message {number} of {topic} is no {TYPE}: {what}"))
 }
 
-/// Returns the topic to read: `topic`, or the only one.
-pub(super) fn chosen(path: &Path, topic: Option<&str>) -> Result<String, Error> {
-    let topics = topics(path)?;
+/// Returns which of the `topics` of the file at `path` to read: `topic`, or the only one.
+pub(super) fn chosen(path: &Path, topics: &[Topic], topic: Option<&str>) -> Result<String, Error> {
     let wrong = |what: &str| {
         let listed: Vec<String> =
             topics.iter().map(|topic| format!("{} ({} messages)", topic.name, topic.messages)).collect();
         let topics = if listed.is_empty() { "none".to_owned() } else { listed.join(", ") };
         Error::at(path, format_args!("{what}; its topics of joint states: {topics}"))
     };
-    match (topic, topics.as_slice()) {
+    match (topic, topics) {
         (Some(name), topics) if topics.iter().any(|topic| topic.name == name) => Ok(name.to_owned()),
         (Some(name), _) => Err(wrong(&format!("there is no topic {name}"))),
         (None, [only]) => Ok(only.name.clone()),

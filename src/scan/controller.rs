@@ -4,7 +4,7 @@
 //! The torque that is commanded is taken for the measured one. So a scan ends when the device holds less than that: by
 //! a clamp in size, warm motors, or a stop. The ramp at the start is over long before the first measurement.
 
-use super::{PdControl, PdOutput, RowStatus, ScanRow, Steadiness, Stop, plan::Recorded};
+use super::{PdControl, PdOutput, RowStatus, ScanRow, Steadiness, Stop, plan::PressRecord};
 use crate::{
     JointVector,
     control::Controller,
@@ -76,7 +76,7 @@ enum Stage {
     /// At a stop that is recorded, since this time.
     Holding {
         arrived: f64,
-        recorded: Recorded,
+        recorded: PressRecord,
     },
     /// After a limit: damping alone, for so many more ticks.
     Braking(Limit, usize),

@@ -10,7 +10,7 @@ use crate::{
     JointVector,
     contact::{Slip, Status},
     dataset::{Dataset, IdentifiedFriction, SlipColumns},
-    gridize::History,
+    gridize::ForceHistory,
     joint_matrix::{entries, lower},
     proxy::Chain,
     scene::{PlanSpec, ScanSpec},
@@ -103,7 +103,7 @@ fn slip(chain: &Chain, node: usize, q: &[f64], torque: &JointVector) -> Option<S
 
 /// The ways from one side to the other along `axis` over the middle, to `reach` on both sides (m) of where the press was
 /// held.
-fn passes(press: &History, chain: &Chain, node: usize, axis: DVec3, reach: f64) -> Vec<Pass> {
+fn passes(press: &ForceHistory, chain: &Chain, node: usize, axis: DVec3, reach: f64) -> Vec<Pass> {
     let joints = chain.joints.len();
     let rows: Vec<[JointVector; 2]> = press
         .configurations

@@ -10,7 +10,7 @@ use crate::{
     Error, JointVector, MAX_AXES,
     csv::{LONGEST_LINE, Lines, Table},
     dataset::JointLabel,
-    gridize::{History, Samples},
+    gridize::{ForceHistory, Samples},
     input,
 };
 use std::{
@@ -295,8 +295,8 @@ impl ScanLog {
 
     /// The presses that were recorded, in the order of measurement; rows of a device that is held count.
     #[must_use]
-    pub fn histories(&self) -> Vec<History> {
-        let mut histories: Vec<History> = Vec::new();
+    pub fn histories(&self) -> Vec<ForceHistory> {
+        let mut histories: Vec<ForceHistory> = Vec::new();
         let mut last = None;
         for row in &self.rows {
             let press = row.status.is_recorded().then_some(row.point);
@@ -305,7 +305,7 @@ impl ScanLog {
                 continue;
             };
             if last.replace(point) != press {
-                histories.push(History::default());
+                histories.push(ForceHistory::default());
             }
             if let Some(history) = histories.last_mut() {
                 history.times.push(row.time);

@@ -19,7 +19,7 @@ pub use controller::GRAVITY;
 pub use friction::{add_slip, identify_friction};
 pub use log::{LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
 pub use pd_control::{PdControl, PdOutput};
-pub use plan::{Plan, Recorded, Stop};
+pub use plan::{Plan, PressRecord, Stop};
 pub use steady::Steadiness;
 pub use trajectory::Trajectory;
 

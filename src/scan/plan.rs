@@ -37,12 +37,12 @@ pub struct Stop {
     /// point at which nothing is measured.
     pub point: Option<usize>,
     /// How it is recorded on the way and there; absent where it is measured at rest, or not at all.
-    pub recorded: Option<Recorded>,
+    pub recorded: Option<PressRecord>,
 }
 
 /// How a stop is approached that is recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Recorded {
+pub struct PressRecord {
     /// Greatest speed of the commanded position (rad/s or m/s).
     pub speed: f64,
     /// Time for which it is held there (s).
@@ -156,7 +156,7 @@ fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Pla
         let (mut bottom, mut last) = (None, None);
         let offset = |axis: usize| plan.across[axis].direction * (place[axis] as f64 * plan.across[axis].spacing);
         let top = plan.start + offset(0) + offset(1);
-        let mut go = |position: DVec3, point: Option<usize>, recorded: Option<Recorded>, stops: &mut Vec<Stop>| {
+        let mut go = |position: DVec3, point: Option<usize>, recorded: Option<PressRecord>, stops: &mut Vec<Stop>| {
             let found = reach(chain, node, position, &near);
             if let Some(q) = found {
                 near = q;
@@ -186,7 +186,7 @@ fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Pla
             let point = Some(points + result.histories);
             result.histories += 1;
             let mut record = |position: DVec3, speed: f64, hold: f64| {
-                go(position, point, Some(Recorded { speed, hold }), &mut result.stops);
+                go(position, point, Some(PressRecord { speed, hold }), &mut result.stops);
             };
             record(bottom, speed, history.hold);
             if press == 0 && history.stroke > 0.0 {

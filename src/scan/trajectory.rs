@@ -5,7 +5,7 @@
 //! departure. A press that is recorded has its own speed, and rests for as long as it is held. Such a controller does not wait until contact is steady, as `haptize scan` does: the dwell time must be
 //! long enough for the object to relax.
 
-use super::{Plan, Stop, plan::Recorded};
+use super::{Plan, Stop, plan::PressRecord};
 use crate::{
     JointVector,
     csv::{Table, plain},
@@ -31,7 +31,7 @@ impl Trajectory {
         let mut rows: Vec<(f64, JointVector)> = Vec::new();
         for Stop { q, point, recorded } in &plan.stops {
             let (speed, rest) = match recorded {
-                Some(Recorded { speed, hold }) => (*speed, *hold),
+                Some(PressRecord { speed, hold }) => (*speed, *hold),
                 None => (speed, if point.is_some() { dwell } else { 0.0 }),
             };
             let (time, from) = rows.last().copied().unwrap_or((0.0, *q));

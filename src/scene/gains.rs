@@ -2,40 +2,8 @@
 //! scene.
 
 use super::{BOUNDARY_SLOPE, HapticsSpec, JointKind, LEVER_ARM};
-use crate::JointVector;
+use crate::{Error, JointVector, error};
 use Quantity::{Gain, Speed, Torque};
-
-/// A gain that cannot be taken.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum GainError {
-    /// No gain of that name.
-    #[error("there is no gain {key:?}: take one of {}", GAINS.map(|((key, ..), _)| key).join(", "))]
-    Unknown {
-        /// The name that was given.
-        key: String,
-    },
-    /// Not one number for all joints, nor one each.
-    #[error("{key} has {found} numbers: give one for all joints, or one for each of the {joints}")]
-    Count {
-        /// The gain.
-        key: &'static str,
-        /// Numbers given.
-        found: usize,
-        /// Joints of the loop.
-        joints: usize,
-    },
-    /// A number that is not in its range.
-    #[error("{key} is {value}: it must be {}", if *zero { "zero or more" } else { "more than zero" })]
-    Value {
-        /// The gain.
-        key: &'static str,
-        /// The value that was given.
-        value: f64,
-        /// Whether it may be zero.
-        zero: bool,
-    },
-}
 
 /// How a default changes from joints that turn to joints that slide, by a lever arm of 0.1 m.
 #[derive(Clone, Copy)]
@@ -93,17 +61,20 @@ impl HapticsSpec {
     ///
     /// # Errors
     /// When there is no such gain, the numbers do not fit, or one is out of its range; nothing is taken then.
-    pub fn set_gain(&mut self, key: &str, values: &[f64]) -> Result<(), GainError> {
+    pub fn set_gain(&mut self, key: &str, values: &[f64]) -> Result<(), Error> {
         let found = GAINS.into_iter().find(|((name, ..), _)| *name == key);
-        let ((key, list, _), zero) = found.ok_or_else(|| GainError::Unknown { key: key.into() })?;
+        let ((key, list, _), zero) = found.ok_or_else(|| {
+            error!("there is no gain {key:?}: take one of {}", GAINS.map(|((key, ..), _)| key).join(", "))
+        })?;
         let (gains, found) = (list(self), values.len());
         let joints = gains.len();
         if found != 1 && found != joints {
-            return Err(GainError::Count { key, found, joints });
+            return Err(error!("{key} has {found} numbers: give one for all joints, or one for each of the {joints}"));
         }
         let is_good = |value: f64| value.is_finite() && (value > 0.0 || (zero && value == 0.0));
         if let Some(&value) = values.iter().find(|value| !is_good(**value)) {
-            return Err(GainError::Value { key, value, zero });
+            let range = if zero { "zero or more" } else { "more than zero" };
+            return Err(error!("{key} is {value}: it must be {range}"));
         }
         gains.iter_mut().zip(values.iter().cycle()).for_each(|(gain, value)| *gain = *value);
         Ok(())

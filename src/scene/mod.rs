@@ -34,7 +34,6 @@ pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
 pub use error::{Diagnostic, SceneError};
 pub(crate) use file::LINEAR_RELAXATION;
-pub use gains::GainError;
 pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};
 pub use grid::{AxisSpec, GRID_LINE, GRID_STEP_SLACK, GridSpec};
 pub use haptics::{
@@ -56,6 +55,7 @@ pub use skin::SkinSpec;
 
 pub(crate) use inertia::positive_semidefinite;
 
+use crate::names;
 use check::Checker;
 use clap::ValueEnum as _;
 use std::path::{Path, PathBuf};
@@ -141,7 +141,8 @@ impl Scene {
             Shape::Sphere { .. } | Shape::Icosphere { .. } => return Ok(scene),
         };
         if let Err(error) = std::fs::metadata(file) {
-            let message = format!("the mesh file {} cannot be opened: {error}", file.display());
+            let message =
+                format!("the mesh file {} cannot be opened: {error}", names::escaped(&file.to_string_lossy()));
             return Err(Checker { path, text: &text }.at(place, message));
         }
         Ok(scene)

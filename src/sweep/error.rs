@@ -66,6 +66,6 @@ pub(super) fn foreign(path: &Path, reason: impl Display) -> Error {
 
 /// The part at `path` is of another sweep, which differs by `difference`.
 pub(super) fn other_part(path: &Path, difference: &str) -> Error {
-    let remedy = "restore that, or delete it to begin anew";
+    let remedy = "restore that, or delete it to start again";
     Error::at(path, format_args!("cannot be continued, it was begun with {difference}; {remedy}"))
 }

@@ -1,6 +1,7 @@
 //! XML of a robot file: elements, their attributes as numbers, and errors at their place.
 
 use super::UrdfError;
+use crate::names;
 use crate::scene::{self, Diagnostic};
 use glam::DVec3;
 use roxmltree::{Document, Node, ParsingOptions};
@@ -107,10 +108,12 @@ impl<'a> Source<'a> {
 
     /// Returns the text of an attribute that must be there.
     pub fn required<'n>(&self, node: Node<'n, '_>, name: &str) -> Result<&'n str, UrdfError> {
-        node.attribute(name).map(str::trim).filter(|text| !text.is_empty()).ok_or_else(|| {
+        let text = node.attribute(name).map(str::trim).filter(|text| !text.is_empty()).ok_or_else(|| {
             let message = format!("<{}> needs the attribute {name}", node.tag_name().name());
             self.error(node.range(), message)
-        })
+        })?;
+        names::check(text).map_err(|problem| self.error(node.range(), problem))?;
+        Ok(text)
     }
 
     /// Returns an attribute as N numbers, `None` if it is missing.

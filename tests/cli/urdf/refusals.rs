@@ -27,6 +27,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("<robot name=\"plain\">", "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\"><xacro:arg/>", 1, &["xacro FILE"]),
     ("<robot name=\"plain\">", "<robot><xacro:arg/>", 1, &["xacro FILE"]),
     ("lower=\"-1\"", "lower=\"${-pi/2}\"", 6, &["xacro"]),
+    ("name=\"turn\"", "name=\"a&#10;b: sound\"", 5, &["\\u000a", "U+000A"]),
     ("lower=\"-1\"", "lower=\"one\"", 6, &["\"one\"", "no number"]),
     ("lower=\"-1\"", "lower=\"nan\"", 6, &["nan"]),
     ("upper=\"1\"", "upper=\"-2\"", 5, &["must be less"]),

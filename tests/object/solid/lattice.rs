@@ -170,3 +170,15 @@ fn ground_per_area_and_per_volume_does_not_depend_on_the_mesh() {
     let per_node = |edge, count| energy_of(edge, count, GroundStiffness::PerNode(10.0));
     assert!(per_node(0.005, 8) > 5.0 * per_node(0.02, 2));
 }
+
+/// A body of 40 m, drawn in millimetres, of which cubes of some millimetres were meant: nothing is laid on its surface
+/// before they are counted, which would take all memory.
+#[test]
+fn cubes_are_counted_before_the_surface_is_looked_at() {
+    let (nodes, triangles) = block([2, 2, 2], 20.0);
+    let shape = Shape::Mesh { file: "body".into(), placement: Placement::METRES, refine: None };
+    let ground = bed(1e3);
+    let refused = Object::from_surface(&spec(shape, elastic(0.3, Some(0.004)), ground), nodes, triangles);
+    let why = refused.err().unwrap().to_string();
+    assert!(why.contains("cubes") && why.contains("millimetres"), "{why}");
+}
