@@ -13,7 +13,7 @@ mod desktop;
 
 use clock::nanoseconds;
 use haptize::{
-    JointVector, MAX_JOINTS,
+    JointVector, MAX_AXES,
     contact::{Model, Status},
     dataset::{Axis, Dataset, Grid, Provenance},
     draw::diagram::{Diagram, Series},
@@ -48,7 +48,7 @@ const LOOK_UPS: u32 = 50;
 
 /// All places of blocks of `level`.
 fn places(space: &Space, level: u32) -> Vec<Place> {
-    let mut places = vec![[0; MAX_JOINTS]];
+    let mut places = vec![[0; MAX_AXES]];
     for a in 0..space.joints() {
         let last = space.block_of(&space.last(level))[a];
         places = places

@@ -3,7 +3,11 @@
 use std::ops::{Deref, DerefMut};
 
 /// Most joints a virtual proxy may have.
-pub const MAX_JOINTS: usize = 6;
+pub const MAX_JOINTS: usize = 12;
+
+/// Most axes of a grid in C-space: the cells of more have thousands of corners, whose 2^d numbers each are looked up in
+/// a tick.
+pub const MAX_AXES: usize = 6;
 
 /// One number per joint: angles (rad) (or lengths (m) of prismatic joints), rates, or torques (N m) (forces (N)).
 #[derive(Clone, Copy, Default, PartialEq)]

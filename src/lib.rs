@@ -122,4 +122,4 @@ mod toml_text;
 pub(crate) use error::error;
 pub use error::{Error, ErrorKind, Location};
 pub use joint_matrix::JointMatrix;
-pub use joint_vector::{JointVector, MAX_JOINTS};
+pub use joint_vector::{JointVector, MAX_AXES, MAX_JOINTS};

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Every check of this repository, in the order in which it is cheapest to fail: formatting, lints, tests, documentation,
-# the demo as a newcomer runs it, and a minute of fuzzing. Needs a Rust toolchain; installs lavapipe, Mesa's software Vulkan, where it is
-# missing, since the compute kernels are always tested on it: the same on every machine.
+# Every check of this repository, in the order in which it is cheapest to fail: formatting, lints, tests, documentation
+# and a minute of fuzzing. Needs a Rust toolchain; installs lavapipe, Mesa's software Vulkan, where it is missing, since
+# the compute kernels are always tested on it: the same on every machine.
 #
 #   bash tests/run.sh
 set -uo pipefail
@@ -105,18 +105,6 @@ tests() {
     return $failed
 }
 
-# The demo as on a fresh machine: no Vulkan driver, no display, an empty folder. It is the program that the tests have built,
-# which saves compiling every dependency once more.
-demo() {
-    local binary=${CARGO_TARGET_DIR:-$PWD/target}/debug/haptize place
-    place=$(mktemp -d) || return 1
-    (cd "$place" && env -u DISPLAY -u WAYLAND_DISPLAY VK_DRIVER_FILES=/none VK_ICD_FILENAMES=/none \
-        timeout 300 "$binary" && ls -l out)
-    local code=$?
-    rm -rf "$place"
-    return $code
-}
-
 step 'Rust toolchain' have_rust
 step 'lavapipe' install_lavapipe
 # Vulkan sees lavapipe and nothing else; a test that finds no adapter fails.
@@ -132,7 +120,6 @@ step 'tests' tests
 beside 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --features viewer --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh
-step 'demo' demo
 # Last, because it leaves a library and a program in which every block is counted.
 step 'fuzzing, guided by coverage' bash tests/fuzz.sh
 joined

@@ -22,7 +22,7 @@
 // Number of this interface. A program that was compiled with another one must not be run with this library.
 #define HZ_ABI 1
 
-// Most joints that an arm may have.
+// Most joints that an arm may have here.
 #define HZ_MAX_JOINTS 6
 
 // How a call ended. Below zero it failed, and nothing but zeros was written to its results.

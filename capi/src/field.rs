@@ -219,7 +219,7 @@ fn overlap(a: *const f64, b: *const f64, entries: usize) -> bool {
 pub fn told_sample(found: &Sample) -> hz_sample {
     hz_sample {
         size: 0,
-        torque: found.torque.padded(),
+        torque: crate::padded(&found.torque),
         energy: found.energy,
         index: found.index,
         status: found.status() as u32,

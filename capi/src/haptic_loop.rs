@@ -107,6 +107,7 @@ pub unsafe extern "C" fn hz_loop_open(
             let (haptics, advice) = setup.retuned(&dataset, &spec)?;
             (Arc::new(haptics), advice)
         };
+        crate::check_joints(haptics.joints())?;
         let begin = JointVector::zeros(haptics.joints());
         let of = DrivenLoop::new(haptics, &begin).map_err(|fault| argument(fault.to_string()))?;
         let remarks: Vec<String> = advice.into_iter().chain(notice.map(str::to_owned)).collect();
@@ -227,8 +228,8 @@ pub unsafe extern "C" fn hz_loop_tick(
         if let Some(info) = info {
             let told = hz_tick {
                 size: 0,
-                proxy: output.proxy.padded(),
-                contact_torque: output.sample.torque.padded(),
+                proxy: crate::padded(&output.proxy),
+                contact_torque: crate::padded(&output.sample.torque),
                 energy: output.sample.energy,
                 contact: output.sample.contact.into(),
                 flags: output.flags.bits().into(),

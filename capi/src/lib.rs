@@ -30,10 +30,24 @@ use std::ffi::{CStr, c_char};
 /// Number of this interface. A program that was compiled with another one must not be run with this library.
 pub const HZ_ABI: u32 = 1;
 
-/// Most joints that an arm may have.
+/// Most joints that an arm may have here.
 pub const HZ_MAX_JOINTS: usize = 6;
 
-const _: () = assert!(HZ_MAX_JOINTS == haptize::MAX_JOINTS);
+const _: () = assert!(HZ_MAX_JOINTS <= haptize::MAX_JOINTS && HZ_MAX_JOINTS == haptize::MAX_AXES);
+
+/// Checks that an arm has no more joints than the structures hold.
+fn check_joints(joints: usize) -> Result<(), outcome::Failure> {
+    if joints <= HZ_MAX_JOINTS {
+        return Ok(());
+    }
+    let message = format!("the arm has {joints} joints, and the C interface takes at most {HZ_MAX_JOINTS}");
+    Err(outcome::Failure { code: hz_code::HZ_SCENE, message })
+}
+
+/// The entries, then zeros.
+fn padded(vector: &[f64]) -> [f64; HZ_MAX_JOINTS] {
+    std::array::from_fn(|joint| vector.get(joint).copied().unwrap_or_default())
+}
 
 const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
     Ok(version) => version,

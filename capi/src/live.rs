@@ -32,7 +32,9 @@ pub unsafe extern "C" fn hz_live_open(
 ) -> hz_code {
     let make = || {
         // SAFETY: as the caller promises.
-        let scene = LiveScene::new(Scene::load(unsafe { outcome::path(path)? })?)?;
+        let scene = Scene::load(unsafe { outcome::path(path)? })?;
+        crate::check_joints(scene.proxy.joints.len())?;
+        let scene = LiveScene::new(scene)?;
         let notice = scene.notice().unwrap_or_default().to_owned();
         Ok((hz_live { field: LiveField::new(scene) }, notice))
     };

@@ -6,7 +6,6 @@ use crate::{
     outcome::{self, Extensible, Told, guarded, hz_code},
 };
 use haptize::{
-    JointVector,
     contact::{Solver, Status},
     scene::Scene,
     sweep::Direct,
@@ -73,6 +72,7 @@ pub unsafe extern "C" fn hz_solver_open(
     let make = || {
         // SAFETY: as the caller promises.
         let scene = Scene::load(unsafe { outcome::path(path)? })?;
+        crate::check_joints(scene.proxy.joints.len())?;
         Ok((hz_solver { direct: Direct::new(&scene)? }, String::new()))
     };
     // SAFETY: as the caller promises.
@@ -130,7 +130,7 @@ pub unsafe extern "C" fn hz_solver_solve(
         let found = Solver::new(solver.direct.model()).solve(&q);
         let told = hz_equilibrium {
             size: 0,
-            torque: JointVector::padded(&found.torque),
+            torque: crate::padded(&found.torque),
             energy: found.energy,
             gap: found.gap,
             residual: found.residual,

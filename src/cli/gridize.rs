@@ -8,7 +8,7 @@ use super::{
     watch,
 };
 use crate::{
-    Error, MAX_JOINTS,
+    Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
         GridizeOptions, GridizeReport, History, Interpolation, Past, Samples, gridize, gridize_remembering,
@@ -304,11 +304,11 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
         };
     };
     let table = JointStateTable::open(log, topic)?;
-    if table.joints().len() > MAX_JOINTS {
+    if table.joints().len() > MAX_AXES {
         let names = table.joints().join(", ");
         let (file, many) = (log.display(), table.joints().len());
         return Err(format!(
-            "{file}: {} has {many} joints ({names}), more than {MAX_JOINTS}: choose some by a column mapping \
+            "{file}: {} has {many} joints ({names}), more than {MAX_AXES}: choose some by a column mapping \
              (--columns)",
             table.topic()
         )

@@ -243,7 +243,7 @@ impl Describe for PlayedSession {
                 text.row("device", format_args!("without torque for {ticks} ticks: {reason}"));
             }
             if let Some(reason) = &tally.stopped {
-                text.row("device", format_args!("stopped for good: {reason}; play again to open it anew"));
+                text.row("device", format_args!("stopped for good: {reason}; run play again to open it"));
             }
         }
         self.timing.describe(text);

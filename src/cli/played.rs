@@ -199,9 +199,7 @@ impl Describe for Timing {
             "give the loop real-time priority (haptize doctor) or an idle core"
         };
         let stolen = stolen.filter(|seconds| *seconds > 0.0).map_or(String::new(), |seconds| {
-            format!(
-                "; the hypervisor took {seconds:.2} s from this virtual machine meanwhile: give it processors of its own"
-            )
+            format!("; the hypervisor took {seconds:.2} s from this virtual machine: give it processors of its own")
         });
         text.row("late", format_args!("{late} ticks by more than half a period: {remedy}{stolen}"));
     }

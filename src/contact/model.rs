@@ -26,7 +26,7 @@ pub struct Model<'a> {
     /// the normal like one spring of this stiffness at the contact point. Finite for rigid contact too:
     /// `RIGID_STIFFNESS` (N/m).
     pub kc: f64,
-    /// Stiffness of each proxy node's spring over kc, in the algorithms but `paper`, whose springs are all alike: more
+    /// Stiffness of each proxy node's spring over kc, in the laws; the paper's iteration has springs all alike: more
     /// than one where the node stands for more than the mean length of link, see [`ContactSpec::node_stiffness`] (1).
     pub shares: Vec<f64>,
     /// Whether each equilibrium comes with its tangent d tau/d q.

@@ -1,6 +1,6 @@
 //! The uniform grid over C-space.
 
-use crate::{JointVector, MAX_JOINTS, csv::plain, names, scene::effort_unit};
+use crate::{JointVector, MAX_AXES, csv::plain, names, scene::effort_unit};
 use serde::{Deserialize, Serialize};
 
 /// Grid coordinates `start + k step`, `k < count`, of one joint.
@@ -100,14 +100,14 @@ impl Grid {
         self.axes.iter().map(|axis| axis.count).collect()
     }
 
-    /// Number of points of a sound grid: 1 to [`MAX_JOINTS`] axes of ascending, finite, distinct grid lines, and no
+    /// Number of points of a sound grid: 1 to [`MAX_AXES`] axes of ascending, finite, distinct grid lines, and no
     /// more points than can be counted.
     ///
     /// # Errors
     /// Problem, in words.
     pub fn check(&self) -> Result<usize, String> {
-        if self.axes.is_empty() || self.axes.len() > MAX_JOINTS {
-            return Err(format!("the grid has {} axes, not 1 to {MAX_JOINTS}", self.axes.len()));
+        if self.axes.is_empty() || self.axes.len() > MAX_AXES {
+            return Err(format!("the grid has {} axes, not 1 to {MAX_AXES}", self.axes.len()));
         }
         let mut points = 1_usize;
         for axis in &self.axes {
@@ -144,8 +144,8 @@ impl Grid {
 
     /// Returns the grid lines on which `point` lies, one per joint; further entries are zero.
     #[must_use]
-    pub fn lines(&self, point: usize) -> [usize; MAX_JOINTS] {
-        let (mut lines, mut rest) = ([0; MAX_JOINTS], point);
+    pub fn lines(&self, point: usize) -> [usize; MAX_AXES] {
+        let (mut lines, mut rest) = ([0; MAX_AXES], point);
         for (line, axis) in lines.iter_mut().zip(&self.axes).rev() {
             (*line, rest) = (rest % axis.count, rest / axis.count);
         }

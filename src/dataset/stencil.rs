@@ -5,10 +5,10 @@
 //! multiplied by it stays continuous. Nothing here allocates; the cost depends on the number of joints alone.
 
 use super::{Axis, Grid};
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 
 /// Corners of a cell with the greatest number of joints.
-const MAX_CORNERS: usize = 1 << MAX_JOINTS;
+const MAX_CORNERS: usize = 1 << MAX_AXES;
 
 /// The corners around one configuration; the first `count` entries count.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +20,7 @@ pub struct Stencil {
     /// Interpolation weight of each corner; they sum to one.
     pub weights: [f64; MAX_CORNERS],
     /// Fraction of the cell along each axis, 0 to 1. Bit a of a corner's number is its side along axis a.
-    pub fractions: [f64; MAX_JOINTS],
+    pub fractions: [f64; MAX_AXES],
     /// One inside the grid, falling to zero one cell outside.
     pub fade: f64,
 }
@@ -53,7 +53,7 @@ impl Grid {
     }
 
     /// First grid lines of the cell that begins at `point`, if one does; an axis of one line is a cell without extent.
-    pub(crate) fn cell_from(&self, point: usize) -> Option<[u32; MAX_JOINTS]> {
+    pub(crate) fn cell_from(&self, point: usize) -> Option<[u32; MAX_AXES]> {
         let low = self.lines(point);
         let begins = |(axis, line): (&Axis, &usize)| line + 1 < axis.count || axis.count == 1;
         self.axes.iter().zip(&low).all(begins).then(|| low.map(|line| line as u32))
@@ -67,7 +67,7 @@ impl Grid {
             count: 1,
             points: [0; MAX_CORNERS],
             weights: [0.0; MAX_CORNERS],
-            fractions: [0.0; MAX_JOINTS],
+            fractions: [0.0; MAX_AXES],
             fade: 1.0,
         };
         stencil.weights[0] = 1.0;
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn weights_reproduce_the_configuration_in_one_to_six_joints() {
-        for joints in 1..=MAX_JOINTS {
+        for joints in 1..=MAX_AXES {
             let grid = grid(&vec![(-0.3, 0.1, 5); joints]);
             let q: Vec<f64> = (0..joints).map(|a| -0.25 + 0.07 * a as f64).collect();
             let stencil = grid.locate(&q);

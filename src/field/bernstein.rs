@@ -6,7 +6,7 @@
 //! axis a.
 
 use super::stiffness::Stiffness;
-use crate::{JointMatrix, JointVector, MAX_JOINTS, store::record::sets};
+use crate::{JointMatrix, JointVector, store::record::sets};
 
 /// Degree along each axis.
 const DEGREE: usize = 3;
@@ -97,11 +97,8 @@ impl Bernstein {
     pub fn bounds(&self, per_step: &JointVector) -> Bounds {
         let (joints, n) = (self.joints, DEGREE as f64);
         let stride = |axis: usize| (DEGREE + 1).pow(axis as u32);
-        let mut bounds = Bounds {
-            greatest: self.greatest(),
-            first: JointVector::zeros(joints),
-            second: [[0.0; MAX_JOINTS]; MAX_JOINTS],
-        };
+        let mut bounds =
+            Bounds { greatest: self.greatest(), first: JointVector::zeros(joints), second: JointMatrix::default() };
         let (mut along, mut twice) = (Vec::new(), Vec::new());
         for a in 0..joints {
             differences(&self.coefficients, DEGREE + 1, stride(a), &mut along);

@@ -31,7 +31,7 @@
 //! it stiffer, raise Ks to the bound, and the bound by bv.
 
 use crate::{
-    JointVector, MAX_JOINTS,
+    JointVector, MAX_AXES,
     dataset::{Axis, Grid},
 };
 use std::{cmp::Reverse, collections::BinaryHeap};
@@ -114,7 +114,7 @@ impl BoundaryLayer {
     /// The eikonal equation at `point`: the u with `sum_a (u - u_a)^2 / (Ks_a h_a^2) = 1` over the axes whose nearer
     /// settled neighbour u_a lies below u.
     fn behind(&self, grid: &Grid, point: usize, distance: &[f64], settled: &[bool]) -> f64 {
-        let mut below = [(f64::INFINITY, 0.0); MAX_JOINTS];
+        let mut below = [(f64::INFINITY, 0.0); MAX_AXES];
         let axes = grid.axes.iter().zip(grid.neighbours(point)).zip(self.compliance.iter());
         for (((axis, beside), compliance), below) in axes.zip(&mut below) {
             let nearer = beside.into_iter().flatten().filter(|&p| settled[p]);

@@ -1,7 +1,7 @@
 //! How the torque changes with the configuration.
 
 use super::TorqueField;
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 
 /// Step of the differences that give the slope of an interpolated torque, over the grid's own step (1): the cube root
 /// of the rounding of f64, where what is rounded and what is left out are alike. Rounding costs 1e-11 of the torque for
@@ -14,7 +14,7 @@ impl TorqueField {
     /// cell, where that has a kink, the mean of both sides. `slope` has d^2 entries. Never allocates.
     pub fn slope(&self, q: &[f64], slope: &mut [f64]) {
         let joints = self.joints();
-        let mut place = [0.0; MAX_JOINTS];
+        let mut place = [0.0; MAX_AXES];
         place[..joints].copy_from_slice(&q[..joints]);
         for (l, axis) in self.grid.axes.iter().enumerate() {
             let ends = [q[l] - GRADIENT_STEP * axis.step, q[l] + GRADIENT_STEP * axis.step];

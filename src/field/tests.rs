@@ -3,7 +3,7 @@
 use super::*;
 use crate::fixtures::grids::{grid, half_space};
 use crate::{
-    MAX_JOINTS,
+    MAX_AXES,
     contact::Status,
     dataset::Provenance,
     joint_matrix::{JointMatrix, add_symmetric},
@@ -38,7 +38,7 @@ fn multilinear(q: &JointVector) -> JointVector {
 
 #[test]
 fn multilinear_fields_are_reproduced_in_one_to_six_joints() {
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         let data = Dataset::of_field(grid(&vec![(-0.4, 0.2, 5); joints]), |q| (multilinear(q), 1.0, Status::Contact));
         let field = rendered(&data, SOFT);
         let mut q = JointVector::zeros(joints);
@@ -262,7 +262,7 @@ fn place(joints: usize, k: usize) -> JointVector {
 
 #[test]
 fn a_linear_object_is_rendered_exactly_by_its_gap_and_by_its_potential() {
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         // No grid point lies on the boundary.
         let axes: Vec<_> = (0..joints).map(|a| (-0.43 + 0.01 * a as f64, 0.2, 5)).collect();
         let data = half_space_with_gap(grid(&axes), 3.0);

@@ -11,7 +11,7 @@ use super::{
     model::RestModel,
     shaders::{self, MOST_CARRIERS},
 };
-use crate::{JointVector, MAX_JOINTS, contact, scene::JointKind};
+use crate::{JointVector, MAX_AXES, contact, scene::JointKind};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 
@@ -106,7 +106,7 @@ impl RestDevice {
         let [nodes, carriers, joints] = if is_hardware {
             [model.chain.nodes.len().next_power_of_two() as u32, parameters.carriers, parameters.joints]
         } else {
-            [u32::MAX, MOST_CARRIERS / 4, MAX_JOINTS as u32]
+            [u32::MAX, MOST_CARRIERS / 4, MAX_AXES as u32]
         };
         let joints = if model.with_tangent { joints } else { 0 };
         let memory = context.workgroup_memory();

@@ -1,6 +1,6 @@
 //! Why the GPU could not do it.
 
-use crate::{Error, memory};
+use crate::{Error, MAX_AXES, memory};
 use std::time::Duration;
 
 /// Why the GPU could not do it.
@@ -60,6 +60,9 @@ pub enum GpuError {
         "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
     )]
     NoClock(String),
+    /// The kernel takes arms of as many joints as a grid has axes.
+    #[error("the GPU solves for arms of at most {MAX_AXES} joints, not {0}. Use --backend cpu")]
+    Joints(usize),
     /// The kernel takes contact with the surface at rest alone.
     #[error(
         "the GPU solves contact with the surface at rest, not by the law `{0}`. Name `law = \"rest\"` in the \

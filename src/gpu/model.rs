@@ -11,7 +11,7 @@ use super::{
     shaders::{DIFFERENCE_STEP, GPU_FAR_AWAY, MOST_CARRIERS},
 };
 use crate::{
-    contact,
+    MAX_AXES, contact,
     proxy::Chain,
     scene::{ContactLaw, JointKind},
 };
@@ -61,6 +61,10 @@ impl RestModel {
     pub fn new(context: &Context, model: &contact::Model<'_>) -> Result<Self, GpuError> {
         if model.contact.law != ContactLaw::Rest {
             return Err(GpuError::Law(model.contact.law.name()));
+        }
+        let joints = model.chain.joints.len();
+        if joints > MAX_AXES {
+            return Err(GpuError::Joints(joints));
         }
         let Parts { parameters, surface, mesh } = Parts::new(model);
         let surface: Vec<[f32; 4]> = surface.into_iter().map(|row| row.map(|number| number as f32)).collect();

@@ -4,7 +4,7 @@
 //! file. Constants that both sides need have one source, here in Rust; sizes and switches are override constants.
 
 use crate::{
-    MAX_JOINTS,
+    MAX_AXES,
     contact::{
         Status,
         geometry::{facet, smooth::CARRIERS},
@@ -148,7 +148,7 @@ fn constants() -> String {
         ("STATUS_UNCONVERGED", Status::Unconverged as u32),
         ("STATUS_OVERFLOW", Status::Overflow as u32),
         ("FACET_ITERATIONS", facet::FACET_ITERATIONS as u32),
-        ("JOINTS", MAX_JOINTS as u32),
+        ("JOINTS", MAX_AXES as u32),
         ("CARRIERS", MOST_CARRIERS / 4),
     ] {
         text.push_str(&format!("const {name}: u32 = {count}u;\n"));

@@ -8,17 +8,17 @@
 //! points in a plane), so that a torque linear in q is reproduced exactly there too.
 
 use super::cloud::Position;
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 
 /// Pivot below which the corners of a simplex span nothing in a direction, as a fraction of the extent: between the
 /// jitter (1e-7 and less), which makes slivers of points in a plane, and the thickness of honest simplices.
 const SLIVER_PIVOT: f64 = 1e-5;
 
 /// Weights of the vertices of a simplex, in their order; entries beyond d + 1 are zero.
-pub(super) type Weights = [f64; MAX_JOINTS + 1];
+pub(super) type Weights = [f64; MAX_AXES + 1];
 
 /// Rows of a linear system, right-hand side in column d.
-type Rows = [[f64; MAX_JOINTS + 1]; MAX_JOINTS];
+type Rows = [[f64; MAX_AXES + 1]; MAX_AXES];
 
 /// Weights at `at` of the simplex of d + 1 `corners`; `None` when the corners span nothing.
 pub(super) fn barycentric(corners: &[&Position], at: &Position) -> Option<Weights> {
@@ -48,7 +48,7 @@ pub(super) fn corrected(mut weights: Weights, corners: &[&Position], at: &Positi
 fn system(corners: &[&Position], at: &Position) -> Rows {
     let joints = corners.len() - 1;
     let base = corners[joints];
-    let mut rows = [[0.0; MAX_JOINTS + 1]; MAX_JOINTS];
+    let mut rows = [[0.0; MAX_AXES + 1]; MAX_AXES];
     for axis in 0..joints {
         for column in 0..joints {
             rows[axis][column] = corners[column][axis] - base[axis];
@@ -59,8 +59,8 @@ fn system(corners: &[&Position], at: &Position) -> Rows {
 }
 
 /// The last weight is what the others leave of one.
-fn completed(solution: [f64; MAX_JOINTS], joints: usize) -> Weights {
-    let mut weights = [0.0; MAX_JOINTS + 1];
+fn completed(solution: [f64; MAX_AXES], joints: usize) -> Weights {
+    let mut weights = [0.0; MAX_AXES + 1];
     weights[..joints].copy_from_slice(&solution[..joints]);
     weights[joints] = 1.0 - solution.iter().sum::<f64>();
     weights
@@ -68,8 +68,8 @@ fn completed(solution: [f64; MAX_JOINTS], joints: usize) -> Weights {
 
 /// Gaussian elimination with full pivoting that stops at pivots below `smallest`: solution, zero where it stopped, and
 /// rank.
-fn eliminate(mut rows: Rows, joints: usize, smallest: f64) -> ([f64; MAX_JOINTS], usize) {
-    let mut order: [usize; MAX_JOINTS] = std::array::from_fn(|column| column);
+fn eliminate(mut rows: Rows, joints: usize, smallest: f64) -> ([f64; MAX_AXES], usize) {
+    let mut order: [usize; MAX_AXES] = std::array::from_fn(|column| column);
     let mut rank = 0;
     while rank < joints {
         let (mut pivot, mut largest) = ((rank, rank), 0.0);
@@ -97,12 +97,12 @@ fn eliminate(mut rows: Rows, joints: usize, smallest: f64) -> ([f64; MAX_JOINTS]
         }
         rank += 1;
     }
-    let mut reduced = [0.0; MAX_JOINTS];
+    let mut reduced = [0.0; MAX_AXES];
     for step in (0..rank).rev() {
         let known: f64 = (step + 1..rank).map(|column| rows[step][column] * reduced[column]).sum();
         reduced[step] = (rows[step][joints] - known) / rows[step][step];
     }
-    let mut solution = [0.0; MAX_JOINTS];
+    let mut solution = [0.0; MAX_AXES];
     for (column, value) in order.into_iter().zip(reduced) {
         solution[column] = value;
     }
@@ -157,6 +157,6 @@ mod tests {
 
     #[test]
     fn corners_in_one_plane_have_no_weights() {
-        assert!(barycentric(&FLAT.each_ref(), &[0.3; MAX_JOINTS]).is_none());
+        assert!(barycentric(&FLAT.each_ref(), &[0.3; MAX_AXES]).is_none());
     }
 }

@@ -9,7 +9,7 @@
 //! hash of a point's own coordinates, hence the same in every run and in any order.
 
 use super::samples::Samples;
-use crate::{Error, MAX_JOINTS, error, random::mix};
+use crate::{Error, MAX_AXES, error, random::mix};
 use std::collections::HashMap;
 
 /// Samples closer than this fraction of the extent are one point: far below any encoder's resolution (a 16-bit encoder
@@ -25,7 +25,7 @@ pub const JITTER: f64 = 1.0 / (1_u64 << 40) as f64;
 const FLAT_CLOUD: f64 = 1e-6;
 
 /// A position in scaled C-space; entries beyond the number of joints are zero.
-pub(super) type Position = [f64; MAX_JOINTS];
+pub(super) type Position = [f64; MAX_AXES];
 
 /// Distinct points in scaled C-space with the averaged torque of each.
 pub(super) struct Cloud {
@@ -70,7 +70,7 @@ impl Cloud {
             positions: Vec::new(),
             torques: Vec::new(),
             variances: Vec::new(),
-            centre: [0.0; MAX_JOINTS],
+            centre: [0.0; MAX_AXES],
             spanning: Vec::new(),
             merged: 0,
         };
@@ -89,7 +89,7 @@ impl Cloud {
 
     /// `q` in scaled coordinates.
     pub fn scaled(&self, q: &[f64]) -> Position {
-        let mut position = [0.0; MAX_JOINTS];
+        let mut position = [0.0; MAX_AXES];
         for (joint, x) in position.iter_mut().enumerate().take(self.joints) {
             *x = (q[joint] - self.origin[joint]) * self.scale[joint];
         }
@@ -109,7 +109,7 @@ impl Cloud {
 
     fn merge(&mut self, samples: &Samples) {
         let joints = self.joints;
-        let mut cells: HashMap<[i64; MAX_JOINTS], usize> = HashMap::with_capacity(samples.len());
+        let mut cells: HashMap<[i64; MAX_AXES], usize> = HashMap::with_capacity(samples.len());
         let mut counts: Vec<f64> = Vec::new();
         let rows = samples.configurations.chunks_exact(joints).zip(samples.torques.chunks_exact(joints));
         for (sample, (q, torque)) in rows.enumerate() {
@@ -145,8 +145,8 @@ impl Cloud {
 /// Origin and scale of the unit box of each unit.
 fn frame(samples: &Samples) -> Result<(Position, Position), Error> {
     let joints = samples.joints.len();
-    let mut low = [0.0; MAX_JOINTS];
-    let mut extent = [0.0; MAX_JOINTS];
+    let mut low = [0.0; MAX_AXES];
+    let mut extent = [0.0; MAX_AXES];
     for joint in 0..joints {
         let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
         low[joint] = column().fold(f64::INFINITY, f64::min);
@@ -158,7 +158,7 @@ fn frame(samples: &Samples) -> Result<(Position, Position), Error> {
             ));
         }
     }
-    let mut scale = [0.0; MAX_JOINTS];
+    let mut scale = [0.0; MAX_AXES];
     for (scale, label) in scale.iter_mut().zip(&samples.joints) {
         let group = samples.joints.iter().zip(extent).filter(|(other, _)| other.unit == label.unit);
         *scale = 1.0 / group.map(|(_, extent)| extent).fold(0.0, f64::max);

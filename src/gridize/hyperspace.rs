@@ -20,7 +20,7 @@ use super::{
     cloud::{Cloud, Position, dot},
     interpolant::{Simplex, Triangulation},
 };
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 use std::collections::HashMap;
 
 /// [`JITTER`](super::cloud::JITTER) for 4 to 6 joints, where circumspheres are computed in floating point: on a cell of
@@ -51,9 +51,9 @@ pub(super) struct Hyperspace {
 struct Cell {
     vertices: Simplex,
     /// Neighbours found so far, opposite to each vertex.
-    across: [Across; MAX_JOINTS + 1],
+    across: [Across; MAX_AXES + 1],
     /// Entry i: the gradient of the weight of vertex i.
-    gradients: [Position; MAX_JOINTS + 1],
+    gradients: [Position; MAX_AXES + 1],
     centre: Position,
     square_radius: f64,
 }
@@ -94,7 +94,7 @@ impl Hyperspace {
         let centre = circumcentre(&corners, &gradients);
         let square_radius = distance_squared(corners[0], &centre);
         let index = walk.cells.len() as u32;
-        walk.cells.push(Cell { vertices, across: [Across::Unknown; MAX_JOINTS + 1], gradients, centre, square_radius });
+        walk.cells.push(Cell { vertices, across: [Across::Unknown; MAX_AXES + 1], gradients, centre, square_radius });
         walk.by_vertices.insert(vertices, index);
         Some(index)
     }
@@ -103,7 +103,7 @@ impl Hyperspace {
     /// those before is least.
     fn grow(&self, at: &Position) -> Option<Simplex> {
         let nearest = self.least(|point| Some(distance_squared(point, at)), &[])?;
-        let mut vertices = [0; MAX_JOINTS + 1];
+        let mut vertices = [0; MAX_AXES + 1];
         vertices[0] = nearest;
         let first = self.points[nearest as usize];
         let mut centre = first;
@@ -233,9 +233,9 @@ fn off_span(point: &Position, origin: &Position, basis: &[Position]) -> (Positio
 }
 
 /// Gradients of the weights of the vertices of a simplex; `None` when it is flat.
-fn weight_gradients(corners: &[&Position]) -> Option<[Position; MAX_JOINTS + 1]> {
+fn weight_gradients(corners: &[&Position]) -> Option<[Position; MAX_AXES + 1]> {
     let joints = corners.len() - 1;
-    let mut gradients = [[0.0; MAX_JOINTS]; MAX_JOINTS + 1];
+    let mut gradients = [[0.0; MAX_AXES]; MAX_AXES + 1];
     for axis in 0..joints {
         let mut at = *corners[joints];
         at[axis] += 1.0;
@@ -250,7 +250,7 @@ fn weight_gradients(corners: &[&Position]) -> Option<[Position; MAX_JOINTS + 1]>
 
 /// Circumcentre: with the last corner as origin, c = 1/2 sum_i |x_i|^2 g_i, because g_i . x_j is one where i = j and
 /// zero elsewhere.
-fn circumcentre(corners: &[&Position], gradients: &[Position; MAX_JOINTS + 1]) -> Position {
+fn circumcentre(corners: &[&Position], gradients: &[Position; MAX_AXES + 1]) -> Position {
     let joints = corners.len() - 1;
     let mut centre = *corners[joints];
     for (corner, gradient) in corners.iter().zip(gradients).take(joints) {

@@ -4,7 +4,7 @@ use super::{
     barycentric::{Weights, barycentric, corrected},
     cloud::{Cloud, Position},
 };
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 
 /// Interpolation of scattered values, asked point after point along a path.
 pub(super) trait Interpolant: Sync {
@@ -21,7 +21,7 @@ pub(super) trait Interpolant: Sync {
 }
 
 /// Vertices of a simplex; the first d + 1 entries count.
-pub(super) type Simplex = [u32; MAX_JOINTS + 1];
+pub(super) type Simplex = [u32; MAX_AXES + 1];
 
 /// A Delaunay triangulation that can be asked where a position lies.
 pub(super) trait Triangulation: Sync {
@@ -67,8 +67,8 @@ impl<T: Triangulation> Linear<'_, T> {
         let simplex = self.triangulation.simplex(walk, inside)?;
         let count = self.cloud.joints + 1;
         let vertex = |i: usize| simplex[if i < count { i } else { 0 }];
-        let jittered: [&Position; MAX_JOINTS + 1] = std::array::from_fn(|i| self.triangulation.position(vertex(i)));
-        let corners: [&Position; MAX_JOINTS + 1] = std::array::from_fn(|i| &self.cloud.positions[vertex(i) as usize]);
+        let jittered: [&Position; MAX_AXES + 1] = std::array::from_fn(|i| self.triangulation.position(vertex(i)));
+        let corners: [&Position; MAX_AXES + 1] = std::array::from_fn(|i| &self.cloud.positions[vertex(i) as usize]);
         let weights = barycentric(&jittered[..count], inside)?;
         let (weights, rank) = corrected(weights, &corners[..count], at);
         Some((simplex, weights, rank == self.cloud.joints))

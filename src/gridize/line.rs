@@ -4,7 +4,7 @@ use super::{
     cloud::{Cloud, Position},
     interpolant::{Simplex, Triangulation},
 };
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 
 /// Points in ascending order.
 pub(super) struct Line<'a> {
@@ -33,7 +33,7 @@ impl Triangulation for Line<'_> {
             return None;
         }
         let left = below.min(last) - 1;
-        let mut simplex = [0; MAX_JOINTS + 1];
+        let mut simplex = [0; MAX_AXES + 1];
         simplex[..2].copy_from_slice(&self.order[left..left + 2]);
         Some(simplex)
     }

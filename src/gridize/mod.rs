@@ -29,7 +29,7 @@ pub use memory::{History, Past, gridize_remembering, predict_histories};
 pub use samples::Samples;
 
 use crate::{
-    Error, MAX_JOINTS,
+    Error, MAX_AXES,
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
     error,
@@ -237,7 +237,7 @@ fn fill<I: Interpolant>(interpolant: &I, cloud: &Cloud, grid: &Grid) -> (Vec<f64
     let blocks = torque.par_chunks_mut(BLOCK * joints).zip(inside.par_chunks_mut(BLOCK)).enumerate();
     blocks.for_each(|(block, (torque, inside))| {
         let mut walk = interpolant.walk();
-        let mut weights = Vec::with_capacity(MAX_JOINTS + 1);
+        let mut weights = Vec::with_capacity(MAX_AXES + 1);
         for (offset, (torque, inside)) in torque.chunks_exact_mut(joints).zip(inside).enumerate() {
             let q = grid.configuration(block * BLOCK + offset);
             interpolant.weights(&mut walk, &cloud.scaled(&q), &mut weights);

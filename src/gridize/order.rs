@@ -71,7 +71,7 @@ mod tests {
             }
         }
         cells.sort_by_key(|cell| {
-            let mut position = [0.0; crate::MAX_JOINTS];
+            let mut position = [0.0; crate::MAX_AXES];
             for (x, c) in position.iter_mut().zip(cell) {
                 *x = f64::from(*c) / f64::from(side);
             }

@@ -9,7 +9,7 @@ use super::{
     cloud::{Cloud, Position},
     interpolant::{Interpolant, Simplex, Triangulation, pulled_in},
 };
-use crate::{Error, MAX_JOINTS, error};
+use crate::{Error, MAX_AXES, error};
 use spade::{
     DelaunayTriangulation, HasPosition, HierarchyHintGenerator, NaturalNeighbor, Point2, PositionInTriangulation,
     Triangulation as _, handles::FixedVertexHandle,
@@ -70,7 +70,7 @@ impl Triangulation for Plane<'_> {
             }
             PositionInTriangulation::OutsideOfConvexHull(_) | PositionInTriangulation::NoTriangulation => return None,
         };
-        let mut simplex = [0; MAX_JOINTS + 1];
+        let mut simplex = [0; MAX_AXES + 1];
         for (entry, vertex) in simplex.iter_mut().zip(face.vertices()) {
             *entry = vertex.data().point;
         }

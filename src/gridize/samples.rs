@@ -1,6 +1,6 @@
 //! Scattered measurements of a contact torque: what a scan or an imported log hands to the gridization.
 
-use crate::{Error, MAX_JOINTS, dataset::JointLabel, error, names, random::mix};
+use crate::{Error, MAX_AXES, dataset::JointLabel, error, names, random::mix};
 
 /// Scattered configurations q with the contact torque tau measured at each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,8 +57,8 @@ impl Samples {
     /// The error names the column and the sample.
     pub fn check(&self) -> Result<(), Error> {
         let joints = self.joints.len();
-        if !(1..=MAX_JOINTS).contains(&joints) {
-            return Err(error!("the measurements have {joints} joints; between 1 and {MAX_JOINTS} can be gridized"));
+        if !(1..=MAX_AXES).contains(&joints) {
+            return Err(error!("the measurements have {joints} joints; between 1 and {MAX_AXES} can be gridized"));
         }
         self.joints.iter().try_for_each(|joint| names::check(&joint.name)).map_err(|why| error!("a joint: {why}"))?;
         let need = self.configurations.len() / joints * joints;

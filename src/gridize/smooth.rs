@@ -9,7 +9,7 @@
 //! torques too, and edges keep their height.
 
 use super::cloud::{Cloud, Position};
-use crate::{Error, MAX_JOINTS};
+use crate::{Error, MAX_AXES};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -20,13 +20,13 @@ const PLANE_PIVOT: f64 = 1e-6;
 /// Neighbours a fitted coefficient.
 const NEIGHBOURS_A_COEFFICIENT: usize = 5;
 /// Coefficients of a plane, at most.
-const MOST: usize = MAX_JOINTS + 1;
+const MOST: usize = MAX_AXES + 1;
 
 /// Points by cells of the unit box.
 struct Cells {
     side: f64,
     joints: usize,
-    points: HashMap<[i32; MAX_JOINTS], Vec<u32>>,
+    points: HashMap<[i32; MAX_AXES], Vec<u32>>,
 }
 
 impl Cells {
@@ -41,7 +41,7 @@ impl Cells {
         cells
     }
 
-    fn cell(&self, position: &Position) -> [i32; MAX_JOINTS] {
+    fn cell(&self, position: &Position) -> [i32; MAX_AXES] {
         position.map(|x| (x / self.side).floor() as i32)
     }
 

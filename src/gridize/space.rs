@@ -6,7 +6,7 @@ use super::{
     interpolant::{Simplex, Triangulation},
     tetrahedra::Tetrahedra,
 };
-use crate::{Error, MAX_JOINTS};
+use crate::{Error, MAX_AXES};
 
 /// Tetrahedra of the jittered points of a cloud.
 pub(super) struct Space(Tetrahedra);
@@ -26,7 +26,7 @@ impl Triangulation for Space {
 
     fn simplex(&self, hint: &mut u32, at: &Position) -> Option<Simplex> {
         let vertices = self.0.locate(at, hint)?;
-        let mut simplex = [0; MAX_JOINTS + 1];
+        let mut simplex = [0; MAX_AXES + 1];
         simplex[..4].copy_from_slice(&vertices);
         Some(simplex)
     }

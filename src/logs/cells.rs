@@ -5,14 +5,14 @@
 //! over the same place would give.
 
 use super::mapping::Keep;
-use crate::{Error, JointVector, MAX_JOINTS, dataset::JointLabel, error, gridize::Samples};
+use crate::{Error, JointVector, MAX_AXES, dataset::JointLabel, error, gridize::Samples};
 use std::collections::BTreeMap;
 
 /// Cells of C-space that an import averages in: about 1 kB each.
 const IMPORT_CELLS: usize = 1_000_000;
 
 /// Cell number on each axis.
-type Key = [i64; MAX_JOINTS];
+type Key = [i64; MAX_AXES];
 
 /// Direction of motion of the lead joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,7 +95,7 @@ impl Cells {
 
     /// Adds a row.
     pub fn add(&mut self, q: &JointVector, torque: &JointVector, direction: Direction) -> Result<(), Error> {
-        let mut key = [0; MAX_JOINTS];
+        let mut key = [0; MAX_AXES];
         for (k, (x, side)) in key.iter_mut().zip(q.iter().zip(&self.sides)) {
             *k = (x / side).floor() as i64;
         }

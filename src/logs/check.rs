@@ -1,7 +1,7 @@
 //! Whether the values of a column mapping can be, and where in its file stands one that cannot.
 
 use super::mapping::{ColumnName, Joint, Keep, Mapping};
-use crate::{MAX_JOINTS, names, scene::effort_unit};
+use crate::{MAX_AXES, names, scene::effort_unit};
 use std::ops::Range;
 use toml::{
     Spanned,
@@ -52,8 +52,8 @@ impl Mapping {
     pub(super) fn check(&self) -> Result<(), Refusal> {
         let Self { table, time, joints, filter, torque } = self;
         let count = joints.len();
-        let within = (1..=MAX_JOINTS).contains(&count);
-        refuse(!within, "joint", format!("{count} [[joint]] tables; 1 to {MAX_JOINTS} are needed"))?;
+        let within = (1..=MAX_AXES).contains(&count);
+        refuse(!within, "joint", format!("{count} [[joint]] tables; 1 to {MAX_AXES} are needed"))?;
         let same =
             "table.delimiter and table.decimal are the same character; tables with comma decimals mostly use `;`";
         refuse(table.delimiter == table.decimal, "table.decimal", same)?;

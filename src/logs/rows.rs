@@ -110,10 +110,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
             self.layout = Some(self.layout(&names)?);
             return if self.mapping.table.header { Ok(None) } else { self.line_outcome(text.as_bytes()) };
         };
-        let mut found = [0.0; 2 * crate::MAX_JOINTS + 1];
+        let mut found = [0.0; 2 * crate::MAX_AXES + 1];
         let joints = layout.positions.len();
         let wanted = layout.time.iter().chain(&layout.positions).chain(&layout.torques);
-        let mut slots = [usize::MAX; 2 * crate::MAX_JOINTS + 1];
+        let mut slots = [usize::MAX; 2 * crate::MAX_AXES + 1];
         slots.iter_mut().zip(wanted).for_each(|(slot, column)| *slot = *column);
         let mut columns = 0;
         let mut bad: Option<(usize, &str)> = None;

@@ -6,7 +6,7 @@
 //! absolute deviation where quantisation makes that zero, after Iglewicz and Hoaglin 1993).
 
 use super::rows::Row;
-use crate::{JointVector, MAX_JOINTS};
+use crate::{JointVector, MAX_AXES};
 use std::collections::VecDeque;
 
 /// Rows to either side among which outliers are sought.
@@ -78,7 +78,7 @@ impl Window {
         const MOST: usize = 2 * OUTLIER_ROWS + 1;
         let range = self.next.saturating_sub(OUTLIER_ROWS)..(self.next + OUTLIER_ROWS + 1).min(self.rows.len());
         let count = range.len();
-        (0..row.torque.len().min(MAX_JOINTS)).any(|joint| {
+        (0..row.torque.len().min(MAX_AXES)).any(|joint| {
             let mut values = [0.0; MOST];
             values.iter_mut().zip(self.rows.range(range.clone())).for_each(|(value, row)| *value = row.torque[joint]);
             let centre = median(&mut values[..count]);

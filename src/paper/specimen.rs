@@ -64,7 +64,7 @@ fn picture(scanned: Scanned<'_>) -> Picture {
         pose.nodes[node]
     };
     let configurations = scanned.samples.configurations.chunks_exact(chain.joints.len());
-    let dots: Vec<DVec3> = configurations.map(&mut visited).filter(|&x| !holds(&block, x)).collect();
+    let dots: Vec<DVec3> = configurations.map(&mut visited).filter(|&x| !holds(block, x)).collect();
     let by_torque = scanned.trace.ticks.iter().max_by(|a, b| a.sample.torque.norm().total_cmp(&b.sample.torque.norm()));
     let pressed = by_torque.map(|tick| {
         let mut pose = chain.new_pose();
@@ -72,14 +72,14 @@ fn picture(scanned: Scanned<'_>) -> Picture {
         pose
     });
 
-    let mut framed = corners(&block).to_vec();
+    let mut framed = corners(block).to_vec();
     framed.extend(dots.iter().copied());
     let joints = pressed.iter().flat_map(|pose| &pose.origins);
     framed.extend(joints.flat_map(|&joint| [joint - 2.0 * LINK, joint + 2.0 * LINK]));
     // From the front left above: the arm stands behind the block's near end, not before it.
     let direction = DVec3::new(0.45, -1.0, 0.6);
     let mut raster = Raster::new(Viewpoint::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize)));
-    draw_block(&mut raster, &block);
+    draw_block(&mut raster, block);
     dots.into_iter().for_each(|dot| raster.sphere(dot, DOT, MEASURED));
     if let Some(pose) = &pressed {
         draw_proxy(&mut raster, chain, pose, LINK, &[]);

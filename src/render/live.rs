@@ -21,7 +21,7 @@ use crate::{
 const STIFFNESS_SAMPLES: usize = 2048;
 
 /// Lines of the grid along each joint (1): the region is all that is used of it.
-const LINES: usize = 3;
+const LINES: usize = 2;
 
 /// A scene that is solved in every tick. Sessions share it.
 pub struct LiveScene {

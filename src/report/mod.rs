@@ -12,6 +12,7 @@ pub mod slices;
 pub mod space;
 
 use crate::{
+    MAX_AXES,
     dataset::{Dataset, replace_file},
     draw::canvas::{Canvas, PictureError},
     proxy::Chain,
@@ -110,10 +111,13 @@ where
     T: Deref<Target = Trace> + Clone + Send + 'a,
 {
     let mut figures = Vec::new();
-    let shown = dataset.clone();
-    figures.push(Figure::picture("cspace", move || Ok(space::space(&shown))));
-    let shown = dataset.clone();
-    figures.push(Figure::drawing("torque", move || slices::slices(&shown)));
+    // Of a live scene with more joints nothing is stored.
+    if dataset.grid.joints() <= MAX_AXES {
+        let shown = dataset.clone();
+        figures.push(Figure::picture("cspace", move || Ok(space::space(&shown))));
+        let shown = dataset.clone();
+        figures.push(Figure::drawing("torque", move || slices::slices(&shown)));
+    }
     let Some((chain, trace)) = recording else { return figures };
     let shown = trace.clone();
     figures.push(Figure::drawing("motion", move || press::press(&shown)));

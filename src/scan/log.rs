@@ -7,7 +7,7 @@
 //! subtracted), standard deviation of a single tick's torque, ticks averaged, status.
 
 use crate::{
-    Error, JointVector, MAX_JOINTS,
+    Error, JointVector, MAX_AXES,
     csv::{LONGEST_LINE, Lines, Table},
     dataset::JointLabel,
     gridize::{History, Samples},
@@ -344,7 +344,7 @@ fn labels(line: &str) -> Result<Vec<JointLabel>, String> {
             Some(JointLabel { name: name.to_owned(), unit: unit.to_owned() })
         })
         .collect();
-    let joints = joints.filter(|joints| (1..=MAX_JOINTS).contains(&joints.len())).ok_or_else(wrong)?;
+    let joints = joints.filter(|joints| (1..=MAX_AXES).contains(&joints.len())).ok_or_else(wrong)?;
     let header = LogHeader { joints, ..LogHeader::default() };
     if header.columns() == line { Ok(header.joints) } else { Err(wrong()) }
 }

@@ -157,11 +157,11 @@ impl ContactTable {
         let nodes = || proxy.joints.iter().flat_map(|joint| &joint.nodes);
         let error = |key: &str, message: &str| Err(checker.at(&format!("contact.{key}"), message));
         if self.updates.is_some() {
-            return error("updates", "updates acted on the law \"linearised\", which is no more: leave it out");
+            return error("updates", "updates applied to the law \"linearised\", which no longer exists: leave it out");
         }
-        let law = self.law.or_else(|remedy| {
+        let law = self.law.map_err(|remedy| {
             let key = LAW_KEYS.into_iter().find(|key| checker.has(&format!("contact.{key}")));
-            Err(checker.at(&format!("contact.{}", key.unwrap_or("law")), remedy))
+            checker.at(&format!("contact.{}", key.unwrap_or("law")), remedy)
         })?;
         let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, surface, .. } = self;
         match (stiffness > 0.0, stiffness_per_length) {

@@ -6,6 +6,7 @@
 use super::check::Checker;
 use super::value::{count, finite, positive};
 use super::{JointSpec, SceneError};
+use crate::MAX_AXES;
 use serde::Deserialize;
 
 /// How far beyond an end a grid line may lie and still count, in steps (1): spacings such as pi/60 are written with a
@@ -64,6 +65,13 @@ impl GridTable {
     /// The grid, which stands at `path` in the text, for an arm with `joints`.
     pub fn check(&self, checker: &Checker<'_>, path: &str, joints: &[JointSpec]) -> Result<GridSpec, SceneError> {
         let at = |message: String| checker.at(path, message);
+        if joints.len() > MAX_AXES {
+            return Err(at(format!(
+                "a grid has at most {MAX_AXES} axes, and the arm has {} joints: leave it out; `haptize play` and \
+                 `haptize view` solve contact of the scene in every tick",
+                joints.len()
+            )));
+        }
         let axes: Vec<AxisSpec> = match (&self.axes, self.spacing) {
             (None, None) => {
                 return Err(at("the grid has no resolution: give spacing, or axes with start, step and count".into()));

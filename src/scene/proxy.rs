@@ -19,7 +19,7 @@ const MAX_NAME: usize = 40;
 /// Most contact nodes of a chain: far more than a chain of six links needs, few enough for one per thread on a GPU.
 pub const MAX_CONTACT_NODES: usize = 4096;
 
-/// The multi-link virtual proxy: a serial chain of one to six joints.
+/// The multi-link virtual proxy: a serial chain of one to twelve joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProxySpec {
     /// From the base outwards.

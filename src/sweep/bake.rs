@@ -2,11 +2,12 @@
 
 use super::{BackendChoice, ChosenBackend, Progress, Run, Shard, Sweep, SweepReport};
 use crate::{
-    Error, ErrorKind, JointVector,
+    Error, ErrorKind, JointVector, MAX_AXES,
     contact::Model,
     dataset::Dataset,
     object::{Compliance, LatticeError, Object},
     proxy::Chain,
+    random::Random,
     scene::{AxisSpec, Scene},
 };
 use std::{
@@ -163,10 +164,18 @@ pub(crate) fn sweep_of<'a>(
 const SAMPLES: usize = 1 << 16;
 
 /// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it
-/// leaves the grid out: what [`Model::reaching`] looks at.
+/// leaves the grid out, at random where the arm has more joints than a grid has axes: what [`Model::reaching`] looks at.
 #[must_use]
 pub fn sample(scene: &Scene) -> Vec<JointVector> {
     let joints = &scene.proxy.joints;
+    if joints.len() > MAX_AXES {
+        let mut random = Random::new(1);
+        let mut draw = || {
+            let drawn = joints.iter().map(|joint| random.between(joint.limits[0], joint.limits[1]));
+            JointVector::from_slice(&drawn.collect::<Vec<_>>())
+        };
+        return (0..SAMPLES).map(|_| draw()).collect();
+    }
     let count = (SAMPLES as f64).powf(1.0 / joints.len().max(1) as f64) as usize;
     let limits =
         |[least, greatest]: [f64; 2]| AxisSpec { start: least, step: (greatest - least) / (count - 1) as f64, count };

@@ -1,11 +1,19 @@
 //! Why a sweep ended early, what was kept of it, and what to do.
 
-use crate::{Error, ErrorKind, error};
+use crate::{Error, ErrorKind, MAX_AXES, error};
 use std::{fmt::Display, io, path::Path};
 
 /// The scene's grid cannot be swept.
 pub(super) fn in_grid(what: impl Display) -> Error {
     error!("the scene's grid: {what}; correct `axes` of [grid] in the scene")
+}
+
+/// An arm has more joints than a grid has axes.
+pub(super) fn too_many_joints(joints: usize) -> Error {
+    error!(
+        "an arm of {joints} joints is too many for a grid, which has at most {MAX_AXES} axes; `haptize play SCENE` and \
+         `haptize view SCENE` solve its contact in every tick"
+    )
 }
 
 /// The columns of `points` grid points, of so many `bytes`, do not fit in memory.
@@ -58,6 +66,6 @@ pub(super) fn foreign(path: &Path, reason: impl Display) -> Error {
 
 /// The part at `path` is of another sweep, which differs by `difference`.
 pub(super) fn other_part(path: &Path, difference: &str) -> Error {
-    let remedy = "restore that, or delete it to begin anew";
+    let remedy = "restore that, or delete it to start again";
     Error::at(path, format_args!("cannot be continued, it was begun with {difference}; {remedy}"))
 }

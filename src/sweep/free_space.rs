@@ -19,7 +19,7 @@
 //! are cut from the grid alone, so that a point is skipped or not whatever chunks, threads and backend there are.
 
 use crate::{
-    JointVector, MAX_JOINTS,
+    JointVector, MAX_AXES,
     contact::{Model, Proximity},
     dataset::{Axis, Grid},
     proxy::Chain,
@@ -67,12 +67,12 @@ pub struct FreeGaps {
 /// Grid points `low..high` along each axis.
 #[derive(Clone, Copy)]
 struct Block {
-    low: [usize; MAX_JOINTS],
-    high: [usize; MAX_JOINTS],
+    low: [usize; MAX_AXES],
+    high: [usize; MAX_AXES],
 }
 
 /// A place on or between grid points, in steps from the first along each axis.
-type Place = [f64; MAX_JOINTS];
+type Place = [f64; MAX_AXES];
 
 /// The arm in the middle of a block.
 struct Placed {
@@ -191,15 +191,13 @@ impl Block {
     /// Whether the block contains `place` when widened by the margin.
     fn is_near(&self, place: &Place) -> bool {
         let margin = FreeSpace::MARGIN as f64;
-        (0..MAX_JOINTS)
-            .all(|j| self.low[j] as f64 - margin <= place[j] && place[j] <= (self.high[j] - 1) as f64 + margin)
+        (0..MAX_AXES).all(|j| self.low[j] as f64 - margin <= place[j] && place[j] <= (self.high[j] - 1) as f64 + margin)
     }
 
     /// Whether all its points are within the margin of `place`.
     fn is_all_near(&self, place: &Place) -> bool {
         let margin = FreeSpace::MARGIN as f64;
-        (0..MAX_JOINTS)
-            .all(|j| place[j] - margin <= self.low[j] as f64 && (self.high[j] - 1) as f64 <= place[j] + margin)
+        (0..MAX_AXES).all(|j| place[j] - margin <= self.low[j] as f64 && (self.high[j] - 1) as f64 <= place[j] + margin)
     }
 
     fn points(&self) -> usize {
@@ -282,7 +280,7 @@ impl FreeSpace<'_> {
     /// Whether the points next to `point`, and so itself, are proven free as a block: a sweep does not solve most of
     /// such points.
     pub(super) fn is_surrounded(&self, proximity: &mut Proximity<'_>, point: usize) -> bool {
-        let (mut low, mut high) = ([0; MAX_JOINTS], [1; MAX_JOINTS]);
+        let (mut low, mut high) = ([0; MAX_AXES], [1; MAX_AXES]);
         for (j, (axis, line)) in self.grid.axes.iter().zip(self.grid.lines(point)).enumerate() {
             (low[j], high[j]) = (line.saturating_sub(1), (line + 2).min(axis.count));
         }

@@ -8,7 +8,7 @@ use super::{
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
     columns::{Columns, Shape},
-    error::{busy, in_grid, in_part, no_memory, stopped, unwritable},
+    error::{busy, in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
     footprint::{self, Bounds},
     lowest,
     measured::{ErrorCheck, MOST_CONFIGURATIONS},
@@ -18,7 +18,7 @@ use super::{
     tally::Tally,
 };
 use crate::{
-    Error,
+    Error, MAX_AXES,
     contact::{MeshRipple, Model},
     dataset::{self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target},
     error, memory,
@@ -468,10 +468,17 @@ impl<'a> Sweep<'a> {
 
 /// Checks that `scene` has a grid.
 pub(super) fn check_given(scene: &Scene) -> Result<(), Error> {
+    check_axes(scene)?;
     if scene.grid.axes.is_empty() {
         return Err("the scene leaves the grid out; `haptize reach SCENE --write` finds one and writes it there".into());
     }
     Ok(())
+}
+
+/// Checks that the arm has no more joints than a grid has axes.
+pub(super) fn check_axes(scene: &Scene) -> Result<(), Error> {
+    let joints = scene.proxy.joints.len();
+    if joints > MAX_AXES { Err(too_many_joints(joints)) } else { Ok(()) }
 }
 
 /// Checks that no other process writes the file `output`: it would be lost, or the dataset written over.

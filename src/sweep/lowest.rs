@@ -112,8 +112,8 @@ struct UniformGrid<'a, 't> {
     shape: Shape,
 }
 
-/// Whether scenes of this `law` have several equilibria of which the lowest counts: the paper's steps define its
-/// result, and contact with the geometry at rest has one equilibrium.
+/// Whether scenes of this `law` have several equilibria of which the lowest counts: contact with the geometry at rest
+/// has one.
 pub(super) fn applies(law: ContactLaw) -> bool {
     law == ContactLaw::Following
 }

@@ -94,8 +94,8 @@ impl Merge {
         let (mut shards, mut notes, mut first) = (BTreeMap::<usize, Contents>::new(), Vec::new(), None);
         for file in files(paths)? {
             let found = Contents::read(&file).map_err(|reason| {
-                let remedy = "leave it out, or solve it anew with `haptize bake --shard`";
-                Error::at(&file, format_args!("is no shard: {reason}; {remedy}"))
+                let remedy = "leave it out, or solve it again with `haptize bake --shard`";
+                Error::at(&file, format_args!("is not a shard: {reason}; {remedy}"))
             })?;
             let (path, binding) = first.get_or_insert_with(|| (file.clone(), found.binding().clone()));
             let is_other = binding.shard.count != found.binding().shard.count;

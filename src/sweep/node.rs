@@ -74,7 +74,7 @@ impl Scale {
     pub fn new(model: &Model<'_>, space: &Space) -> Self {
         let joints = space.joints();
         let steps: Vec<f64> = (0..joints).map(|a| space.step(0, a)).collect();
-        let first = space.configuration(0, &[0; crate::MAX_JOINTS]);
+        let first = space.configuration(0, &[0; crate::MAX_AXES]);
         let last = space.configuration(0, &space.last(0));
         let ranges: Vec<[f64; 2]> = first.iter().zip(last.iter()).map(|(first, last)| [*first, *last]).collect();
         let bounds = model.chain.jacobian_bounds(&ranges);

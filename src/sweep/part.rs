@@ -97,7 +97,7 @@ impl Binding {
             ("another tolerance", mine.tolerance != its.tolerance),
             ("another grid", self.grid != other.grid),
             ("another text of the scene", self.scene != other.scene),
-            ("another object, such as a mesh that changed meanwhile", self.object != other.object),
+            ("another object, such as a mesh that has changed since", self.object != other.object),
             ("another interpolation, for which tangents are stored or not", self.with_tangent != other.with_tangent),
             ("friction, for which slips are stored or not", self.with_slip != other.with_slip),
         ];

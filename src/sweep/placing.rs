@@ -1,6 +1,6 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::build_object;
+use super::{build_object, grid_sweep::check_axes};
 use crate::{
     Error, JointVector,
     contact::{Model, Proximity},
@@ -70,6 +70,7 @@ impl Placing {
         if scene.proxy.joints.iter().all(|joint| joint.nodes.is_empty()) {
             return Ok(None);
         }
+        check_axes(scene)?;
         Self::from(scene, &build_object(scene)?, wanted, None).map(Some)
     }
 
@@ -79,6 +80,7 @@ impl Placing {
     /// # Errors
     /// When the object is refused.
     pub fn brought(scene: &Scene) -> Result<Option<(DVec3, Self)>, Error> {
+        check_axes(scene)?;
         let (mut object, chain) = (build_object(scene)?, Chain::new(&scene.proxy));
         let body = corners(&object.rest[..object.surface_nodes]);
         let standoff = PRESS_GAP * length(body);

@@ -5,7 +5,7 @@
 //! most as deep as asked for; the grid's ranges are the least box that holds all of it that was met. Its lines are so
 //! far apart that a step along any axis moves the proxy by about as much as along any other.
 
-use super::{build_object, spacing};
+use super::{build_object, grid_sweep::check_axes, spacing};
 use crate::{
     Error, ErrorKind, JointVector,
     contact::{Model, NodeTree},
@@ -123,6 +123,7 @@ impl Reach {
     /// # Errors
     /// When the object is refused, nothing touches, or `stop` is raised.
     pub fn new(scene: &Scene, depth: Option<f64>, stop: &AtomicBool) -> Result<Self, Error> {
+        check_axes(scene)?;
         let object = build_object(scene)?;
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.

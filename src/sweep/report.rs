@@ -44,7 +44,7 @@ pub struct SweepReport {
     pub backend: String,
     /// Name of the adapter.
     pub adapter: String,
-    /// `energy`, `paper` or `rest`.
+    /// `following`, `rest` or `paper`.
     pub algorithm: String,
     /// Memory and disk, as they were stated before the sweep.
     pub footprint: Footprint,

@@ -8,7 +8,7 @@
 use super::group::Group;
 use super::robot::{Joint, JointType, Robot};
 use super::{Inertial, Placed, UrdfError};
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 use crate::scene::JointKind;
 use glam::{DAffine3, DQuat, DVec3};
 use std::collections::HashMap;
@@ -84,12 +84,12 @@ impl Arm {
             .filter(|number| !held.contains_key(*number))
             .map(|&number| robot.joints[number].name.as_str())
             .collect();
-        if moving.is_empty() || moving.len() > MAX_JOINTS {
+        if moving.is_empty() || moving.len() > MAX_AXES {
             let message = match moving.len() {
                 0 => format!("no joint moves link {tip:?}: name a tip farther out"),
                 count => format!(
-                    "the chain to {tip:?} has {count} moving joints, {}: a scene takes {MAX_JOINTS}; hold some with \
-                     --lock JOINT=VALUE",
+                    "the chain to {tip:?} has {count} moving joints, {}: a scene with a grid takes {MAX_AXES}; hold \
+                     some with --lock JOINT=VALUE",
                     moving.join(", ")
                 ),
             };

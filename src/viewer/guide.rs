@@ -1,7 +1,7 @@
 //! Who leads the hand: the pointer, keys, or one of the scene's motions, which plays, pauses and can be scrubbed.
 
 use super::loaded::Loaded;
-use crate::{JointVector, MAX_JOINTS, device::Motion, scene::Waypoint};
+use crate::{JointVector, device::Motion, scene::Waypoint};
 use eframe::egui;
 
 /// The target that the simulated hand follows. The caller passes the time; this type reads no clock.
@@ -37,8 +37,9 @@ pub struct Guide {
 /// Keys that are held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Keys {
-    /// How fast each joint is to move, from -1 to 1, as a share of the speed of keys.
-    pub speeds: [f64; MAX_JOINTS],
+    /// How fast each of the first joints is to move, from -1 to 1, as a share of the speed of keys: there are keys for so
+    /// many.
+    pub speeds: [f64; 6],
     /// Whether the hand is to go back to where it was at first.
     pub home: bool,
 }

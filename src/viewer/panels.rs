@@ -134,8 +134,8 @@ impl Viewer {
             return;
         }
         let coming = [
-            (session.is_retuning(), "The loop is made anew …"),
-            (self.scene.is_redrawing(), "The object is set up anew …"),
+            (session.is_retuning(), "The loop is set up again …"),
+            (self.scene.is_redrawing(), "The object is set up again …"),
         ];
         if let Some((_, what)) = coming.into_iter().find(|(is_coming, _)| *is_coming) {
             ui.spinner();

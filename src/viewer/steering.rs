@@ -107,7 +107,7 @@ impl Steering {
 /// Returns the keys that are held: a pair for each joint, the second of which moves it forwards.
 fn held(input: &InputState) -> Keys {
     use Key::{A, D, E, F, G, H, Q, R, S, T, W, Y};
-    const PAIRS: [[Key; 2]; crate::MAX_JOINTS] = [[A, D], [S, W], [Q, E], [F, H], [G, T], [R, Y]];
+    const PAIRS: [[Key; 2]; 6] = [[A, D], [S, W], [Q, E], [F, H], [G, T], [R, Y]];
     let way = |[less, more]: [Key; 2]| f64::from(i8::from(input.key_down(more)) - i8::from(input.key_down(less)));
     Keys { speeds: PAIRS.map(way), home: input.key_down(Key::Home) }
 }

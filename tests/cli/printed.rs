@@ -2,7 +2,10 @@
 //!
 //! Compared with `tests/snapshots/printed.txt`; with `UPDATE_SNAPSHOTS=1` that file is written again.
 
-use super::commands::{FINGER, changed, without_grid};
+use super::{
+    commands::{FINGER, changed, without_grid},
+    demo::{FOR_PEOPLE, FOR_PROGRAMS},
+};
 use crate::common::program::{haptize, text};
 use serde_json::Value;
 use std::{collections::BTreeMap, fmt::Write, fs, path::Path};
@@ -208,10 +211,13 @@ fn commands_print_what_they_always_printed() {
     [&for_people, &for_programs].into_iter().for_each(|folder| furnish(folder.path()));
     let mut printed = String::new();
     for arguments in COMMANDS {
-        let (said, told) = rayon::join(
-            || haptize(for_people.path(), arguments),
-            || haptize(for_programs.path(), &[arguments, &["--json"]].concat()),
-        );
+        let (said, told) = match arguments {
+            [] => (FOR_PEOPLE.output.clone(), FOR_PROGRAMS.output.clone()),
+            _ => rayon::join(
+                || haptize(for_people.path(), arguments),
+                || haptize(for_programs.path(), &[arguments, &["--json"]].concat()),
+            ),
+        };
         let object: Value = serde_json::from_slice(&told.stdout).unwrap_or_default();
         let code = said.status.code();
         assert_eq!(code, told.status.code(), "{arguments:?}: {}{}", text(&said.stderr), text(&told.stderr));

@@ -5,7 +5,7 @@ use haptize::scene::{
     ContactLaw, ContactSurface, Diagnostic, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind,
     Material, Rendering, Scene, SceneError, Shape,
 };
-use haptize::{JointVector, MAX_JOINTS};
+use haptize::{JointVector, MAX_AXES, MAX_JOINTS};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -494,11 +494,18 @@ fn long_lines_and_control_characters_do_not_reach_the_terminal() {
 }
 
 #[test]
-fn the_number_of_joints_is_one_to_six() {
+fn the_number_of_joints_is_one_to_twelve_and_six_with_a_grid() {
     let joint = "[[proxy.joint]]\nkind = \"revolute\"\naxis = [0, 0, 1]\nlimits = [0, 0.5]\n";
-    let with = |extra: usize| parse(&LEAST.replace("[contact]", &format!("{}[contact]", joint.repeat(extra))));
-    assert_eq!(with(5).unwrap().proxy.joints.len(), MAX_JOINTS);
-    assert!(with(6).unwrap_err().to_string().contains("7 joints: it must have 1 to 6"));
+    let arm = |extra: usize| LEAST.replace("[contact]", &format!("{}[contact]", joint.repeat(extra)));
+    assert_eq!(parse(&arm(5)).unwrap().proxy.joints.len(), MAX_AXES);
+    let refused = parse(&arm(6)).unwrap_err().to_string();
+    assert!(
+        refused.contains("at most 6 axes, and the arm has 7 joints") && refused.contains("haptize play"),
+        "{refused}"
+    );
+    let free = |extra: usize| parse(&arm(extra).replace("[grid]\nspacing = 0.1", ""));
+    assert_eq!(free(11).unwrap().proxy.joints.len(), MAX_JOINTS);
+    assert!(free(12).unwrap_err().to_string().contains("13 joints: it must have 1 to 12"));
     let none = LEAST.replace("[[proxy.joint]]", "[proxy]\njoint = []\n[unused]");
     assert!(parse(&none).is_err());
     let empty = "[proxy]\njoint = []\n".to_owned();

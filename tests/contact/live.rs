@@ -75,6 +75,53 @@ fn live_contact_is_that_of_the_solver_wherever_it_comes_from() {
     }
 }
 
+/// Steps of central differences (rad).
+const STEP: f64 = 1e-6;
+
+/// With twelve joints, too many for a grid: the torque is minus the gradient of the energy, the tangent that of the torque.
+#[test]
+fn an_arm_of_twelve_joints_is_pushed_down_the_gradient_of_the_energy() {
+    let scene = Scene::parse(include_str!("../scenes/snake.toml"), "snake.toml").unwrap();
+    assert_eq!(scene.proxy.joints.len(), haptize::MAX_JOINTS);
+    with_model(&scene, |model| {
+        let mut model = model.clone();
+        model.with_tangent = true;
+        let (mut live, mut solver) = (LiveSolver::new(&model), Solver::new(&model));
+        let mut random = Random::new(5);
+        let (mut touched, mut worst, mut worst_tangent) = (0, 0.0_f64, 0.0_f64);
+        for _ in 0..200 {
+            let mut q = scene.motion.press[1].q;
+            q.iter_mut().for_each(|q| *q += random.between(-0.02, 0.02));
+            let (here, expected) = (live.solve(&q), solver.solve(&q));
+            assert_eq!(here.status, expected.status);
+            if here.status == Status::Free {
+                continue;
+            }
+            let size = expected.torque.iter().fold(0.0_f64, |most, tau| most.max(tau.abs()));
+            let steep = expected.tangent.unwrap();
+            let stiffest = steep.as_flattened().iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+            for joint in 0..q.len() {
+                let [before, after] = [-STEP, STEP].map(|step| {
+                    let mut moved = q;
+                    moved[joint] += step;
+                    solver.solve(&moved)
+                });
+                if [&before, &after].iter().any(|there| there.touches.len() != expected.touches.len()) {
+                    continue;
+                }
+                let slope = (before.energy - after.energy) / (2.0 * STEP);
+                worst = worst.max((slope - here.torque[joint]).abs() / size);
+                let differences = after.torque.iter().zip(before.torque.iter()).map(|(a, b)| (a - b) / (2.0 * STEP));
+                let off = differences.zip(steep[joint]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                worst_tangent = worst_tangent.max(off / stiffest);
+            }
+            touched += 1;
+        }
+        println!("{touched} touch, torque {worst:.1e} off, tangent {worst_tangent:.1e}");
+        assert!(touched > 100 && worst < 1e-6 && worst_tangent < 1e-3, "{touched} {worst} {worst_tangent}");
+    });
+}
+
 /// What is no configuration has no torque, and leaves the next one as it is.
 #[test]
 fn what_is_no_configuration_is_not_solved() {

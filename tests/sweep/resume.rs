@@ -83,7 +83,7 @@ fn a_part_of_another_sweep_is_refused_with_the_difference() {
     // The same scene, but what it names is not what it was: an inner node of a mesh moved, say.
     let other = Object::build(&changed("stiffness = 300.0", "stiffness = 300.1").object).unwrap();
     let elsewhere = Sweep::new(&scene(), &other, "cpu", "none", date).unwrap();
-    assert_eq!(refused(&elsewhere), "another object, such as a mesh that changed meanwhile");
+    assert_eq!(refused(&elsewhere), "another object, such as a mesh that has changed since");
     let mut following = scene();
     following.contact.law = haptize::scene::ContactLaw::Following;
     assert_eq!(refused(&sweep_of(&following, "none", date)), "another algorithm");

@@ -1,7 +1,7 @@
 //! The contents of a block: the nodes that were solved, and what they add to the interpolation of the levels below.
 
 use super::{record::width, space::Place};
-use crate::{MAX_JOINTS, contact::Status};
+use crate::{MAX_AXES, contact::Status};
 
 /// Solved nodes of a block, ascending by their place in it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -118,5 +118,5 @@ impl Block {
 
 /// The block above, along the axes in `set`, of the one with `place`.
 pub(crate) fn beyond(place: &Place, set: usize) -> Place {
-    std::array::from_fn::<_, MAX_JOINTS, _>(|a| place[a] + (set >> a & 1) as u32)
+    std::array::from_fn::<_, MAX_AXES, _>(|a| place[a] + (set >> a & 1) as u32)
 }

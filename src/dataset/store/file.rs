@@ -189,7 +189,10 @@ fn read(mut file: Container, grid: Grid, provenance: Provenance) -> Result<Datas
     let scene = file.text("scene")?.to_owned();
     let shape: Shape = serde_json::from_str(file.text("store")?).map_err(|error| format!("store: {error}"))?;
     if shape.order != ORDER {
-        return Err(format!("its nodes are to be interpolated by {:?}, which is no more: bake it again", shape.order));
+        return Err(format!(
+            "its nodes are to be interpolated by {:?}, which no longer exists: bake it again",
+            shape.order
+        ));
     }
     let space = Space::new(&grid, shape.levels).map_err(|error| error.to_string())?;
     let (joints, wide) = (space.joints(), width(space.joints()));

@@ -11,7 +11,7 @@
 //! multiplications, three 250.
 
 use super::record::{MAX_WIDTH, mixed, sets, slope, width};
-use crate::MAX_JOINTS;
+use crate::MAX_AXES;
 
 /// Numbers that the derivatives along `joints` axes take before they are contracted: axis a has `2^a width(a)`.
 pub(super) const fn rates(joints: usize) -> usize {
@@ -35,7 +35,7 @@ fn basis(x: f64) -> [[f64; 4]; 2] {
 /// The Hermite interpolant and its gradient. `C = 2^D`, `W = width(D)`, `R = rates(D)`. The numbers are overwritten.
 pub(super) fn hermite<const D: usize, const C: usize, const W: usize, const R: usize>(
     numbers: &mut [[f64; C]; W],
-    fractions: &[f64; MAX_JOINTS],
+    fractions: &[f64; MAX_AXES],
 ) -> (f64, [f64; D]) {
     let mut derived = [0.0; R];
     let numbers = numbers.as_flattened_mut();
@@ -129,9 +129,9 @@ fn contract_half_both<const HALF: usize>(
 pub(super) fn transfer(
     joints: usize,
     side: usize,
-    fractions: &[f64; MAX_JOINTS],
+    fractions: &[f64; MAX_AXES],
 ) -> Option<[[f64; MAX_WIDTH]; MAX_WIDTH]> {
-    let mut factors = [[[0.0; 2]; 2]; MAX_JOINTS];
+    let mut factors = [[[0.0; 2]; 2]; MAX_AXES];
     for (axis, factors) in factors.iter_mut().enumerate().take(joints) {
         let both = basis(fractions[axis]);
         let first = 2 * (side >> axis & 1);

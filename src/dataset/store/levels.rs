@@ -75,7 +75,7 @@ macro_rules! with_joints {
             3 => with_joints!(@ $d = 3, $value),
             4 => with_joints!(@ $d = 4, $value),
             5 => with_joints!(@ $d = 5, $value),
-            _ => with_joints!(@ $d = $crate::MAX_JOINTS, $value),
+            _ => with_joints!(@ $d = $crate::MAX_AXES, $value),
         }
     };
     (@ $d:ident = $joints:expr, $value:expr) => {{

@@ -34,7 +34,7 @@ pub use block::{Block, Nodes};
 pub(crate) use space::Cell;
 pub use space::{Place, Space};
 
-use crate::{Error, MAX_JOINTS, dataset::Grid, error};
+use crate::{Error, MAX_AXES, dataset::Grid, error};
 pub(crate) use block::beyond;
 pub use levels::Root;
 use levels::linear;
@@ -106,11 +106,10 @@ impl Store {
         let space = self.space.clone();
         let (joints, is_one) = (space.joints(), space.block_nodes() == 1);
         let (below, block) = (level.checked_sub(1), *block);
-        let last = below.map_or([0; MAX_JOINTS], |below| space.last(below));
+        let last = below.map_or([0; MAX_AXES], |below| space.last(below));
         // A block of 2^d nodes: node `block` of the level below, and those one farther; at most twice as many blocks
         // are listed as there are. One node: those around it, along the axes along which it lies between two.
-        let (first, axes) =
-            if is_one { (block.map(|i| i >> 1), block.map(|i| i & 1)) } else { (block, [1; MAX_JOINTS]) };
+        let (first, axes) = if is_one { (block.map(|i| i >> 1), block.map(|i| i & 1)) } else { (block, [1; MAX_AXES]) };
         let between = (0..joints).map(|a| (axes[a] as usize) << a).sum::<usize>();
         let sets = (0..1_usize << joints).filter(move |set| below.is_some() && set & !between == 0);
         let inside =

@@ -4,7 +4,7 @@
 //! `w_a` and then `w_ab` for all b < a. Second derivatives along one axis are not among them: Hermite interpolation
 //! does not use them.
 
-use crate::{MAX_JOINTS, contact::Slip, joint_matrix};
+use crate::{MAX_AXES, contact::Slip, joint_matrix};
 
 /// Numbers of a node of `joints` joints: 1, 2, 4, 7, 11, 16, 22.
 #[must_use]
@@ -13,7 +13,7 @@ pub const fn width(joints: usize) -> usize {
 }
 
 /// Most numbers that a node has.
-pub const MAX_WIDTH: usize = width(MAX_JOINTS);
+pub const MAX_WIDTH: usize = width(MAX_AXES);
 
 /// Position of `w_a`.
 #[must_use]
@@ -47,9 +47,9 @@ mod tests {
     #[test]
     fn each_axis_adds_its_own_numbers_behind_those_before() {
         assert_eq!([0, 1, 2, 3, 4, 5, 6].map(width), [1, 2, 4, 7, 11, 16, 22]);
-        let sets: Vec<usize> = sets(MAX_JOINTS).collect();
+        let sets: Vec<usize> = sets(MAX_AXES).collect();
         assert_eq!(sets.len(), MAX_WIDTH);
-        for a in 0..MAX_JOINTS {
+        for a in 0..MAX_AXES {
             assert_eq!(sets[slope(a)], 1 << a);
             for b in 0..a {
                 assert_eq!(sets[mixed(a, b)], 1 << a | 1 << b);

@@ -6,10 +6,10 @@
 //! across blocks takes all of their nodes, with blocks of 2^d nodes 1.5^d times as many as it has corners on average. A
 //! key packs a level and the coordinates of a block into 64 bits, ascending with the level.
 
-use crate::{Error, MAX_JOINTS, dataset::Grid, error};
+use crate::{Error, MAX_AXES, dataset::Grid, error};
 
 /// Coordinates of a node or a block, one for each joint; the others are zero.
-pub type Place = [u32; MAX_JOINTS];
+pub type Place = [u32; MAX_AXES];
 
 /// Bits of a key for the level.
 const LEVEL_BITS: u32 = 4;
@@ -38,7 +38,7 @@ pub(crate) struct Cell {
     /// Its first corner.
     pub low: Place,
     /// Fractions of the cell along each axis, 0 to 1.
-    pub fractions: [f64; MAX_JOINTS],
+    pub fractions: [f64; MAX_AXES],
 }
 
 impl Space {
@@ -124,7 +124,7 @@ impl Space {
     /// Last node of `level` along each axis.
     #[must_use]
     pub fn last(&self, level: u32) -> Place {
-        let mut last = [0; MAX_JOINTS];
+        let mut last = [0; MAX_AXES];
         last.iter_mut().zip(&self.base.axes).for_each(|(last, axis)| *last = (axis.count as u32 - 1) << level);
         last
     }
@@ -165,7 +165,7 @@ impl Space {
     /// Level and block of a key; `None` if no block of this space has it.
     #[must_use]
     pub fn block(&self, key: u64) -> Option<(u32, Place)> {
-        let (mut rest, mut block) = (key, [0; MAX_JOINTS]);
+        let (mut rest, mut block) = (key, [0; MAX_AXES]);
         for k in block[..self.joints()].iter_mut().rev() {
             *k = u32::try_from(rest & ((1 << self.bits) - 1)).ok()?;
             rest >>= self.bits;
@@ -180,7 +180,7 @@ impl Space {
     pub fn nodes(&self, level: u32, block: &Place) -> impl Iterator<Item = (usize, Place)> + use<> {
         let (joints, shift, last, block) = (self.joints(), self.shift, self.last(level), *block);
         (0..self.block_nodes()).filter_map(move |place| {
-            let mut node = [0; MAX_JOINTS];
+            let mut node = [0; MAX_AXES];
             for a in 0..joints {
                 node[a] = (block[a] << shift) + (place >> a & 1) as u32;
             }
@@ -200,7 +200,7 @@ impl Space {
 
     /// The cell of the base around a node of `level`.
     pub(super) fn around(&self, level: u32, node: &Place) -> Cell {
-        let mut cell = Cell { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
+        let mut cell = Cell { low: [0; MAX_AXES], fractions: [0.0; MAX_AXES] };
         for (a, (axis, i)) in self.base.axes.iter().zip(node).enumerate() {
             cell.low[a] = (i >> level).min(axis.count as u32 - 2);
             cell.fractions[a] = f64::from(i - (cell.low[a] << level)) / f64::from(1_u32 << level);
@@ -212,7 +212,7 @@ impl Space {
 impl Cell {
     /// The cell of `grid` around `q`, which has one entry per joint, at the grid's border beyond it.
     pub fn of(grid: &Grid, q: &[f64]) -> Self {
-        let mut cell = Self { low: [0; MAX_JOINTS], fractions: [0.0; MAX_JOINTS] };
+        let mut cell = Self { low: [0; MAX_AXES], fractions: [0.0; MAX_AXES] };
         for (a, (axis, &q)) in grid.axes.iter().zip(q).enumerate() {
             let (low, fraction) = axis.cell(q);
             (cell.low[a], cell.fractions[a]) = (low as u32, fraction);

@@ -4,9 +4,10 @@ use super::*;
 use haptize::render::{live::LiveScene, watchdog::GREATEST_POSITION_AGE};
 use std::sync::Arc;
 
-/// The shipped scene of this name after `edit`, ready to be felt.
+/// The shipped scene of this name, or the tests' own arm of twelve joints, after `edit`, ready to be felt.
 fn live(name: &str, edit: impl Fn(String) -> String) -> (Dataset, Setup) {
-    let path = format!("{}/datasets/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let folder = if name == "snake" { "tests/scenes" } else { "datasets" };
+    let path = format!("{}/{folder}/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     let text = edit(std::fs::read_to_string(&path).unwrap());
     let scene = Arc::new(LiveScene::new(Scene::parse(&text, path).unwrap()).unwrap());
     let dataset = scene.dataset();
@@ -17,7 +18,7 @@ fn live(name: &str, edit: impl Fn(String) -> String) -> (Dataset, Setup) {
 #[test]
 fn a_live_session_makes_no_energy_and_is_repeated_and_replayed_to_the_last_bit() {
     let friction = |text| text + "\n[haptics.friction]\ncoefficient = 0.3\n";
-    for (name, has_friction) in [("mesh", false), ("touch", false), ("organ", true)] {
+    for (name, has_friction) in [("mesh", false), ("touch", false), ("organ", true), ("snake", true)] {
         let (dataset, setup) = live(name, |text| if has_friction { friction(text) } else { text });
         let play = || {
             let way = Motion::through(&setup.scene.motion.press, setup.chain.joints.len()).unwrap();

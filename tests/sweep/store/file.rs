@@ -2,7 +2,7 @@
 
 use super::fixture::{noise, space, step, store};
 use haptize::{
-    ErrorKind, MAX_JOINTS,
+    ErrorKind, MAX_AXES,
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
     store::Store,
@@ -28,7 +28,7 @@ fn refinement(dataset: &Dataset) -> &Store {
 #[test]
 fn a_store_comes_back_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
-    for joints in [1, 3, MAX_JOINTS] {
+    for joints in [1, 3, MAX_AXES] {
         let path = folder.path().join(format!("{joints}.store"));
         let written = file(joints);
         written.save(path.as_path()).unwrap();

@@ -1,7 +1,7 @@
 //! Stores with random nodes at random places.
 
 use haptize::{
-    MAX_JOINTS,
+    MAX_AXES,
     contact::Status,
     dataset::{Axis, Grid},
     fixtures::Random,
@@ -28,7 +28,7 @@ pub fn space(joints: usize, levels: u32) -> Space {
 /// All blocks of `level`.
 pub fn blocks(space: &Space, level: u32) -> Vec<Place> {
     let joints = space.joints();
-    let mut places = vec![[0; MAX_JOINTS]];
+    let mut places = vec![[0; MAX_AXES]];
     for a in 0..joints {
         let along = 0..=space.block_of(&space.last(level))[a];
         places = places

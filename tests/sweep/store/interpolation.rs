@@ -2,7 +2,7 @@
 
 use super::fixture::{blocks, nodes, noise, slip, space, step, store};
 use haptize::{
-    JointVector, MAX_JOINTS,
+    JointVector, MAX_AXES,
     dataset::{Axis, Dataset, Grid, Provenance},
     field::TorqueField,
     fixtures::Random,
@@ -37,7 +37,7 @@ fn greatest_jump(store: &Store, joints: usize, mut sample: impl FnMut(&[f64]) ->
     for axis in 0..joints {
         for line in 1..store.space().last(finest)[axis] {
             for _ in 0..60 {
-                let mut node = [0; MAX_JOINTS];
+                let mut node = [0; MAX_AXES];
                 let mut q = store.space().configuration(finest, &node);
                 for a in 0..joints {
                     let cells = store.space().last(0)[a];
@@ -61,7 +61,7 @@ fn greatest_jump(store: &Store, joints: usize, mut sample: impl FnMut(&[f64]) ->
 
 #[test]
 fn it_is_smooth_at_every_border_of_blocks_and_levels() {
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         for seed in 0..3 {
             let store = store(joints, levels(joints), 0.6, seed, noise(joints, 99 + seed));
             let [value, slope] = greatest_jump(&store, joints, |q| store.sample(q));
@@ -76,7 +76,7 @@ fn it_is_smooth_at_every_border_of_blocks_and_levels() {
 #[test]
 fn the_comparison_sees_a_step_between_cells() {
     // A reader whose value changes from cell to cell of the finest level.
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         let store = store(joints, levels(joints), 0.6, 0, noise(joints, 99));
         let finest = store.space().levels() - 1;
         let [value, _] = greatest_jump(&store, joints, |q| {
@@ -109,7 +109,7 @@ fn the_slopes_are_the_gradient_and_so_the_field_has_no_curl() {
         }
         greatest
     };
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         // Third derivatives of order 10^3, and kinks of the curvature, by steps of 1e-4.
         let potential = differs(joints, 3);
         assert!(potential < 2e-2, "{joints} joints: {potential}");
@@ -120,7 +120,7 @@ fn the_slopes_are_the_gradient_and_so_the_field_has_no_curl() {
 
 #[test]
 fn every_node_is_met_by_value_slopes_and_mixed_derivatives() {
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         let store = store(joints, levels(joints), 0.6, 21, noise(joints, 4));
         let space = store.space();
         let mut seen = 0;
@@ -168,7 +168,7 @@ fn polynomial(q: &[f64], cubic: bool) -> Vec<f64> {
 
 #[test]
 fn polynomials_are_met_everywhere_whatever_nodes_there_are() {
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         let store = store(joints, levels(joints), 0.5, 8, |q| polynomial(q, true));
         let mut random = Random::new(2);
         for _ in 0..200 {
@@ -187,7 +187,7 @@ fn polynomials_are_met_everywhere_whatever_nodes_there_are() {
 
 #[test]
 fn slips_that_are_affine_are_met_everywhere_whatever_nodes_there_are() {
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         let store = store(joints, levels(joints), 0.5, 8, noise(joints, 3));
         assert!(store.has_slips());
         let mut random = Random::new(2);
@@ -224,7 +224,7 @@ fn beyond_the_grid_and_what_is_no_number_is_answered_at_the_border() {
     let store = store(3, 3, 0.6, 1, noise(3, 1));
     let corner = store.sample(&store.space().configuration(0, &store.space().last(0)));
     assert_eq!(store.sample(&[9.0, 1e300, f64::INFINITY]), corner);
-    let first = store.sample(&store.space().configuration(0, &[0; MAX_JOINTS]));
+    let first = store.sample(&store.space().configuration(0, &[0; MAX_AXES]));
     assert_eq!(store.sample(&[f64::NAN, -9.0, f64::NEG_INFINITY]), first);
     let empty = Store::new(space(3, 2));
     let root = empty.sample(&[0.0; 3]);

@@ -3,7 +3,7 @@
 use super::fixture::{blocks, nodes, noise, space, store};
 use crate::fixture::peak;
 use haptize::{
-    Error, MAX_JOINTS,
+    Error, MAX_AXES,
     contact::Status,
     dataset::{Axis, Grid},
     store::{Nodes, Place, Space, Store, record::width},
@@ -38,7 +38,7 @@ fn the_same_blocks_in_another_order_make_the_same_store_to_the_bit() {
             let (level, place) = one.space().block(key).unwrap();
             other.publish(level, &place, block.nodes().clone()).unwrap();
         }
-        let mut q = one.space().configuration(0, &[0; MAX_JOINTS]);
+        let mut q = one.space().configuration(0, &[0; MAX_AXES]);
         for k in 0..100 {
             q.iter_mut().enumerate().for_each(|(a, q)| *q = 0.1 + 0.25 * (0.3 * f64::from(k) + a as f64).sin());
             assert_eq!(one.sample(&q), other.sample(&q));
@@ -69,7 +69,7 @@ fn a_block_without_its_foundation_or_twice_is_refused() {
 fn what_is_not_sound_is_refused() {
     let space = space(2, 2);
     let mut store = Store::new(space.clone());
-    let block = [0; MAX_JOINTS];
+    let block = [0; MAX_AXES];
     let sound = nodes(&space, 0, &block, |_| true, noise(2, 1));
     let mut bad = vec![sound.clone(), sound.clone(), sound.clone(), sound.clone(), sound.clone()];
     bad[0].records[3] = f32::NAN;
@@ -81,7 +81,7 @@ fn what_is_not_sound_is_refused() {
         assert!(refusal(store.publish(0, &block, nodes)).contains("not sound"));
     }
     // Outside the grid, beyond the levels, and nodes of the level below.
-    for (level, place) in [(0, [9, 0, 0, 0, 0, 0]), (2, block), (0, [u32::MAX; MAX_JOINTS])] {
+    for (level, place) in [(0, [9, 0, 0, 0, 0, 0]), (2, block), (0, [u32::MAX; MAX_AXES])] {
         assert!(refusal(store.publish(level, &place, Nodes::default())).contains("not sound"));
     }
     store.publish(0, &block, sound).unwrap();
@@ -92,7 +92,7 @@ fn what_is_not_sound_is_refused() {
 
 #[test]
 fn keys_come_back_and_what_cannot_be_numbered_is_refused() {
-    for joints in 1..=MAX_JOINTS {
+    for joints in 1..=MAX_AXES {
         let space = space(joints, 2);
         for level in 0..2 {
             for block in blocks(&space, level) {

@@ -2,7 +2,7 @@
 
 use super::{Target, container, write};
 use haptize::{
-    MAX_JOINTS,
+    MAX_AXES,
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
     store::{Nodes, Space, Store, record::width},
@@ -23,7 +23,7 @@ pub const STORES: Target = Target {
         let Some(store) = &read.refinement else { return "a dataset".into() };
         let joints = read.grid.axes.len();
         for q in [-1e9, -0.2, -0.13, 0.05, 1e9] {
-            let root = store.sample(&[q; MAX_JOINTS][..joints]);
+            let root = store.sample(&[q; MAX_AXES][..joints]);
             let torque = root.torque();
             assert_eq!(torque.len(), joints);
         }
@@ -47,7 +47,7 @@ fn made(joints: usize) -> Vec<u8> {
         let last = store.space().last(level);
         let along = last[0] / 2 + 1;
         for number in 0..along.pow(joints as u32) {
-            let mut block = [0; MAX_JOINTS];
+            let mut block = [0; MAX_AXES];
             (0..joints).for_each(|a| block[a] = number / along.pow(a as u32) % along);
             let mut nodes = Nodes::default();
             for (place, _) in store.space().nodes(level, &block) {
