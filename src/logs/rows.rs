@@ -46,6 +46,7 @@ struct Layout {
 }
 
 /// Result of reading a line.
+#[expect(clippy::large_enum_variant, reason = "one at a time; a box would be memory for every row")]
 pub(super) enum ReadRowResult {
     Row(Row),
     /// Left out, and why.

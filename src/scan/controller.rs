@@ -210,6 +210,7 @@ impl<'a> ScanController<'a> {
     }
 
     /// The torque of the PD control at `position`, unless a limit is exceeded; then the device is braked.
+    #[expect(clippy::result_large_err, reason = "the real-time thread allocates no box")]
     fn control(&mut self, position: &JointVector) -> Result<PdOutput, Stage> {
         let output = self.control.torque(position, self.period);
         let ticks = (BRAKE_TIME * self.spec.control.rate) as usize;
@@ -235,6 +236,7 @@ impl<'a> ScanController<'a> {
     }
 
     /// The torque that answers `reading` in this stage, without gravity; `Err` is the stage to go on with.
+    #[expect(clippy::result_large_err, reason = "the real-time thread allocates no box")]
     fn stage(&mut self, stage: Stage, reading: &Reading) -> Result<Option<JointVector>, Stage> {
         let position = &reading.position;
         let (next, output) = match stage {
