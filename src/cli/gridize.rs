@@ -425,7 +425,11 @@ impl Describe for Gridized {
         if *merged > 0 {
             text.row("merged", format_args!("{merged} samples at the same configuration as another"));
         }
-        text.row("in contact", format_args!("{contact_points} points, torque above {epsilon:.4}"));
+        let unit = match &self.axes[..] {
+            [first, others @ ..] if others.iter().all(|axis| axis.unit == first.unit) => first.effort_unit(),
+            _ => "N m or N",
+        };
+        text.row("in contact", format_args!("{contact_points} points, torque above {epsilon:.4} {unit}"));
         if *left_out > 0 {
             text.row("left out", watch::counted(*left_out, ["row", "rows"]));
         }

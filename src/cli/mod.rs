@@ -182,8 +182,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     // A name that forges a line would be printed again and again.
     let mut texts = arguments.iter().skip(1).map(|argument| argument.to_string_lossy());
     if let Some(argument) = texts.find(|argument| argument.contains(names::is_disruptive)) {
-        let what =
-            format!("\"{}\" holds characters that break or turn a line: rename the file", names::escaped(&argument));
+        let what = format!(
+            "\"{}\" holds characters that break or turn a line: leave them out, or rename the file",
+            names::escaped(&argument)
+        );
         last_words(&what, arguments.iter().any(|argument| argument == "--json"));
         return WRONG_COMMAND_LINE;
     }

@@ -97,9 +97,10 @@ impl<'a> Materials<'a> {
     pub fn check(&self) -> Result<(), Error> {
         let mut found = self.elastic.inclusions.iter().zip(&self.found[1..]);
         match found.find(|(_, found)| !found.load(Ordering::Relaxed)) {
-            Some((inclusion, _)) => {
-                Err(error!("no part of the solid is in the inclusion ({inclusion}): correct its place, or remove it"))
-            }
+            Some((inclusion, _)) => Err(error!(
+                "no part of the solid is in the inclusion ({inclusion}), or a later one covers it: correct its place or the \
+                     order, or remove it"
+            )),
             None => Ok(()),
         }
     }

@@ -40,7 +40,11 @@ pub(super) fn stopped(done: usize, points: usize, part: Option<&Path>) -> Error 
 
 /// The file or folder at `path` cannot be begun.
 pub(super) fn unwritable(path: &Path, source: &io::Error) -> Error {
-    let remedy = "make the folder, or choose another output (-o) in one where you may write";
+    let remedy = match source.kind() {
+        io::ErrorKind::NotFound => "make the folder, or choose another output (-o)",
+        io::ErrorKind::InvalidFilename => "choose an output with a shorter name (-o)",
+        _ => "choose another output (-o), in a folder where you may write",
+    };
     Error::at(path, format_args!("cannot be written: {source}; {remedy}")).of(ErrorKind::File)
 }
 

@@ -130,7 +130,7 @@ pub struct Trial {
 pub struct Prospect {
     /// As the scene names it.
     pub interpolation: &'static str,
-    /// Measured order p of the error in the spacing (1).
+    /// Measured order p of the error in the spacing; 0 where it does not fall, and a grid that was tried will do (1).
     pub order: f64,
     /// How many times as fine as the pilot's finest grid it must be; less than one where a coarser one does (1).
     pub finer: f64,
@@ -370,9 +370,15 @@ fn percent(share: f64) -> impl fmt::Display {
 fn prospects(trials: &[Trial], aim: f64, joints: usize) -> Vec<Prospect> {
     let of = |interpolation: Interpolation| {
         let rows = || trials.iter().filter(move |trial| trial.interpolation == interpolation.name());
-        let order = spacing::order(rows().map(|trial| (trial.spacing, trial.rms))).filter(|order| *order > 0.0)?;
         let finest = rows().next()?;
         let coarsest = rows().next_back()?;
+        let order = spacing::order(rows().map(|trial| (trial.spacing, trial.rms))).filter(|order| *order > 0.0);
+        let Some(order) = order else {
+            // Where errors are those of rounding they do not fall; a grid that was tried and keeps the aim will do.
+            let kept = rows().rev().find(|trial| trial.rms <= aim)?;
+            let (finer, points) = (finest.spacing / kept.spacing, kept.points as f64);
+            return Some((Prospect { interpolation: interpolation.name(), order: 0.0, finer, points }, finest.rms));
+        };
         let finer = (finest.rms / aim).powf(1.0 / order).max(finest.spacing / coarsest.spacing);
         let points = finest.points as f64 * finer.powi(joints as i32);
         Some((Prospect { interpolation: interpolation.name(), order, finer, points }, finest.rms))
@@ -411,4 +417,25 @@ fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, Error> 
     let backend = ChosenBackend::open(backend, &model)?;
     let sweep = Sweep::new(scene, &ground.object, "", "", "")?;
     Ok(sweep.footprint(backend.chunk(), false))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A torque that every grid reproduces to rounding: its errors do not fall, and the coarsest grid will do.
+    #[test]
+    fn errors_of_rounding_are_no_reason_to_refuse_an_aim() {
+        let trial = |spacing: f64, points, rms| Trial { interpolation: "potential", spacing, points, rms, worst: rms };
+        let trials = [trial(0.1, 65, 3e-17), trial(0.2, 33, 1e-17), trial(0.4, 17, 2e-17)];
+        let found = prospects(&trials, 0.05, 1);
+        assert_eq!(
+            found.iter().map(|found| (found.interpolation, found.points)).collect::<Vec<_>>(),
+            [("potential", 17.0)]
+        );
+        assert!((found[0].finer - 0.25).abs() < 1e-12, "{found:?}");
+        // Errors beyond the aim that do not fall give none.
+        let trials = trials.map(|trial| Trial { rms: trial.rms + 0.1, ..trial });
+        assert_eq!(prospects(&trials, 0.05, 1), []);
+    }
 }

@@ -210,12 +210,13 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, press: &Press)
     writeln!(
         text,
         "# One number per joint: {TIP_STIFFNESS:.0} N/m and at most {TIP_FORCE:.0} N where the arm meets the ball, \
-         through each joint's lever.\n# proxy_damping is left out: it is as much as the stiffness of the contact asks for.\n"
+         through each joint's lever.\n"
     )?;
     writeln!(text, "[haptics]")?;
     let stiffness: Vec<f64> = press.levers.iter().map(|lever| TIP_STIFFNESS * lever * lever).collect();
     let scaled = |factor: f64| list(&stiffness, |k| coarse(factor * k));
     entry(text, "boundary_slope", &scaled(0.75), "N m/rad or N/m")?;
+    entry(text, "proxy_damping", &scaled(2.5e-3), "N m s/rad or N s/m")?;
     entry(text, "coupling_stiffness", &scaled(1.0), "N m/rad or N/m")?;
     entry(text, "coupling_damping", &scaled(5e-4), "N m s/rad or N s/m")?;
     entry(text, "device_damping", &scaled(1.5e-3), "N m s/rad or N s/m")?;

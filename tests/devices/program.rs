@@ -207,7 +207,7 @@ fn a_whole_plan_is_scanned_with_a_touch_by_the_command_line() {
     // Nothing is left to do, and nothing is measured twice.
     let again = json(&scan(&["--resume"]));
     assert!(again["whole"] == true && ScanLog::read(&path.join("plan.csv")).unwrap().rows.len() == 24, "{again}");
-    let gridized = haptize(path, &["gridize", "plan.csv", "--step", "0.03,0.05,0.04", "--json"]);
+    let gridized = haptize(path, &["gridize", "plan.csv", "--step", "0.03,0.02,0.04", "--epsilon", "0.005", "--json"]);
     assert_eq!(gridized.status.code(), Some(0), "{}", String::from_utf8_lossy(&gridized.stderr));
 }
 

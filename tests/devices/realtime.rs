@@ -7,7 +7,7 @@ use crate::common::{
 };
 use assert_no_alloc::assert_no_alloc;
 use haptize::{
-    JointVector, MAX_JOINTS,
+    JointVector, MAX_AXES,
     control::{Clock, LONGEST_ARREARS, Patience},
     dataset::Dataset,
     device::{Applied, Device, Halt, Motion, Pointer, Reading, Scheduler, SimulatedHand},
@@ -66,7 +66,7 @@ fn hand(joints: usize) -> SimulatedHand {
 #[test]
 fn a_tick_allocates_nothing_whatever_it_is_told() {
     let ways = [Interpolation::Linear, Interpolation::Potential];
-    for (joints, way) in (1..=MAX_JOINTS).flat_map(|joints| ways.map(|way| (joints, way))) {
+    for (joints, way) in (1..=MAX_AXES).flat_map(|joints| ways.map(|way| (joints, way))) {
         let haptics = interpolated(&object(joints), way);
         let all = |x: f64| JointVector::from_slice(&vec![x; joints]);
         let mut state = haptics.start(&all(0.0)).unwrap();

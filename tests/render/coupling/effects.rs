@@ -99,13 +99,13 @@ fn an_effect_that_cannot_act_is_refused_with_its_line() {
     let message = Setup::new(&data).err().unwrap().to_string();
     assert!(message.contains("friction needs to know how contacts slip"), "{message}");
     assert!(message.contains(&format!("scene:{line}:")), "{message}");
-    // A real object's contacts are not known: a scan with friction in its scene is refused at once.
+    // A real object's friction is measured: a scan with friction in its scene is refused at once.
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sponge.toml");
     let text = std::fs::read_to_string(path).unwrap();
     assert!(ScanScene::parse(&text, path).is_ok());
     let message =
         ScanScene::parse(&format!("{text}\n[haptics.friction]\ncoefficient = 0.3\n"), path).unwrap_err().to_string();
-    assert!(message.contains("friction needs to know how contacts slip"), "{message}");
+    assert!(message.contains("is identified from [scan.history], not named"), "{message}");
     for (spec, expected) in [
         ("[haptics.friction]\nstiffness = 1.0", "coefficient"),
         ("[haptics.friction]\ncoefficient = -0.1", "coefficient is -0.1: it must be positive"),
