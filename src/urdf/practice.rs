@@ -26,14 +26,15 @@ impl Practice {
         let mut pose = chain.new_pose();
         let mut best: Option<(Posture, Ball)> = None;
         for posture in Posture::all(chain, None) {
+            // Of the two sides of a posture the clearer one is taken.
+            let is_clear = |ball: &Ball| ball.clearance > 0.5 * PRESS_GAP * ball.radius;
+            if best.as_ref().is_some_and(|(other, ball)| is_clear(ball) && other.q != posture.q) {
+                break;
+            }
             chain.pose(&posture.q, &mut pose);
             let ball = Ball::before(&posture, pose.origins.first().copied().unwrap_or(DVec3::ZERO));
-            let (clearance, needed) = (ball.clearance, 0.5 * PRESS_GAP * ball.radius);
-            if best.as_ref().is_none_or(|(_, best)| clearance > best.clearance) {
+            if best.as_ref().is_none_or(|(_, best)| ball.clearance > best.clearance) {
                 best = Some((posture, ball));
-            }
-            if clearance > needed {
-                break;
             }
         }
         best.map(|(Posture { q, node, direction, .. }, Ball { centre, radius, .. })| Self {

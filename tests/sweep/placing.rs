@@ -176,6 +176,9 @@ fn a_mesh_of_ones_own_is_put_before_the_arm_and_felt() {
     let far = text.replace("[proxy]", "").replace("young = 4000.0", "young = 4000.0 # mine");
     std::fs::write(path.join("a.toml"), far).unwrap();
     let again = run(&["place", "a.toml", "--move", "--write"]);
-    assert_eq!(again["point"], report["point"]);
+    for k in 0..3 {
+        let [now, before] = [&again, &report].map(|report| report["point"][k].as_f64().unwrap());
+        assert!((now - before).abs() < 1e-9, "{again}");
+    }
     assert!(std::fs::read_to_string(path.join("a.toml")).unwrap().contains("# mine"));
 }

@@ -179,7 +179,7 @@ fn what_does_not_belong_together_is_refused() {
     let note = parts.path().join("notes.shard");
     fs::write(&note, "my notes").unwrap();
     let refused = gathered();
-    assert!(refused.to_string().starts_with(&format!("{}: is no shard", note.display())), "{refused}");
+    assert!(refused.to_string().starts_with(&format!("{}: is not a shard", note.display())), "{refused}");
     let refused = Merge::gather(&[note.with_extension("none")]).map(|_| ()).unwrap_err();
     assert_eq!(refused.kind(), ErrorKind::File, "{refused}");
     let empty = tempfile::tempdir().unwrap();
