@@ -127,7 +127,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
 
     tell(format_args!("drawing ..."));
     let figures = Figures { folder };
-    let instants = object::instants(&dataset, &setup.chain, &pressed, INSTANTS)?;
+    let instants = object::instants(&dataset, &setup.chain, &pressed, INSTANTS, None)?;
     let mut files = figures.sheet("fig2-procedure", &procedure(sphere, scans))?;
     files.extend(figures.picture("fig3-cspace", &space(&dataset))?);
     files.extend(figures.sheet("fig4-gridization", &gridized(&bare.source.samples, &bare.dataset))?);

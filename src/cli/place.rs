@@ -32,8 +32,8 @@ pub struct Arguments {
     /// Move the object before the tip of the arm, instead of the tip before the object.
     #[arg(long = "move", conflicts_with = "at")]
     moves: bool,
-    /// Take the closed surface in this file (OBJ, STL or PLY) for the object, an elastic solid under a skin, and move it
-    /// before the tip.
+    /// Take the closed surface in this file (OBJ, STL or PLY) for the object, an elastic solid under a skin, and move
+    /// it before the tip.
     #[arg(long, value_name = "FILE", conflicts_with = "at")]
     mesh: Option<PathBuf>,
     /// Unit of the mesh's coordinates; by default millimetres where the object would be longer than two metres.

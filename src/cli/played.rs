@@ -110,7 +110,8 @@ pub fn write(setup: &Setup, dataset: &Arc<Dataset>, played: &Played, folder: &Pa
         replace_file(&frames, |out| played.trace.write_frames(out)).map_err(|error| unwritten(&frames, error))?;
         files.push(frames);
     }
-    let mut figures = report::figures(dataset, Some((&Arc::new(setup.chain.clone()), &played.trace)));
+    let mut figures =
+        report::figures(dataset, Some((&Arc::new(setup.chain.clone()), &played.trace)), setup.haptics.source().live());
     if let Some(timing) = played.timing.clone() {
         figures.push(report::Figure::drawing("jitter", move || report::jitter::jitter(&timing)));
     }

@@ -21,8 +21,8 @@ pub struct PastMiddle {
 }
 
 impl Proximity<'_> {
-    /// Returns the contact node that gets to the middle of the thinnest part, or past it, while the arm moves from `q` to one of
-    /// the configurations `reached`. Contact nodes whose middles are outside the object at `q` are left out.
+    /// Returns the contact node that gets to the middle of the thinnest part, or past it, while the arm moves from `q`
+    /// to one of the configurations `reached`. Contact nodes whose middles are outside the object at `q` are left out.
     pub fn past_middle(&mut self, q: &[f64], reached: impl IntoIterator<Item = JointVector>) -> Option<PastMiddle> {
         self.gap(q);
         let model = self.model();

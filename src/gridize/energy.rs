@@ -6,9 +6,13 @@
 //! contact begins between a free point and one that touches, the trapezoid is too large: there the torque is taken to
 //! grow from zero as fast as it grows on to the next point behind, `U_b = tau_b^2 / (2 k)`.
 
-use crate::{contact::Status, dataset::Grid};
+use crate::{
+    contact::{Status, linear::support::dot},
+    dataset::Grid,
+};
 
-/// Residual over that of zero energies at which U is as good as its torques, which are known to four digits at best (1).
+/// Residual over that of zero energies at which U is as good as its torques, which are known to four digits at best
+/// (1).
 const RESIDUAL: f64 = 1e-8;
 
 /// One difference of U.
@@ -114,10 +118,6 @@ fn solve(points: usize, differences: &[Difference]) -> Vec<f64> {
     }
     energy.iter_mut().for_each(|x| *x = x.max(0.0));
     energy
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -22,11 +22,12 @@ use crate::{
 use std::collections::BTreeMap;
 
 /// What is wrong with histories of which nothing can be compared.
-const NO_HISTORY: &str = "no history has rows that count inside the grid: take a smaller step, so that it reaches farther, or record in the middle \
-     of the range";
+const NO_HISTORY: &str = "no history has rows that count inside the grid: take a smaller step, so that it reaches \
+                          farther, or record in the middle of the range";
 
 /// What is wrong where nothing fades.
-const NO_RELAXATION: &str = "no relaxation is found: the torque does not fade measurably while the object is held; leave it out, or hold longer";
+const NO_RELAXATION: &str = "no relaxation is found: the torque does not fade measurably while the object is held; \
+                             leave it out, or hold longer";
 
 /// Rounds of gridizing and identifying, at most; and the change of every term over its size at which they end: a tenth
 /// of what is asked of an identified term.
@@ -215,8 +216,8 @@ mod tests {
 
     const TERMS: [[f64; 2]; 2] = [[0.4, 3.0], [0.25, 60.0]];
 
-    /// A log of steps to 0.2, 0.4 up to 1.0 rad at `speed`, each held for 60 s; torque on the arm, an exponential spring's
-    /// with the loop's memory, z by small steps.
+    /// A log of steps to 0.2, 0.4 up to 1.0 rad at `speed`, each held for 60 s; torque on the arm, an exponential
+    /// spring's with the loop's memory, z by small steps.
     fn log(speed: f64) -> ForceHistory {
         const STEP: f64 = 0.01;
         let (mut q, mut z, mut history) = (0.0_f64, [0.0; 2], ForceHistory::default());

@@ -11,6 +11,8 @@
 //! are not negative; the times alone are searched, term by term on a logarithmic grid, then each along its logarithm. A
 //! further term is taken where it lessens the misfit enough.
 
+use crate::contact::linear::support::dot;
+
 /// Times on the grid of the search, a decade (1): the misfit of a time that is off by a sixth of a decade leads
 /// downhill to the right one.
 const A_DECADE: f64 = 3.0;
@@ -56,7 +58,8 @@ impl Identified {
     }
 }
 
-/// The remembered part z / w of the root at each time of `stretch`, for a term of `time` theta; w goes straight between.
+/// The remembered part z / w of the root at each time of `stretch`, for a term of `time` theta; w goes straight
+/// between.
 fn remembered(stretch: &Stretch, time: f64) -> Vec<f64> {
     let mut z = 0.0;
     let mut parts = Vec::with_capacity(stretch.times.len());
@@ -118,10 +121,6 @@ impl Problem<'_> {
         };
         self.stretches.iter().zip(&self.scales).flat_map(of).collect()
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Least squares of `y` over `columns` with the factors of all but the first not positive; the sum of squares left, and
@@ -193,7 +192,7 @@ impl Fit {
 
     /// Moves time `term` to where the misfit is least between its neighbours on the grid.
     fn refine(&mut self, problem: &Problem<'_>, y: &[f64], term: usize, bounds: [f64; 2]) {
-        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        const GOLDEN: f64 = std::f64::consts::GOLDEN_RATIO - 1.0;
         let centre = self.times[term].ln();
         let reach = std::f64::consts::LN_10 / A_DECADE;
         let [mut low, mut high] = [(centre - reach).max(bounds[0].ln()), (centre + reach).min(bounds[1].ln())];
@@ -227,8 +226,8 @@ impl Fit {
     }
 }
 
-/// Identifies at most `most` terms. `scaled`: each stretch has a scale of its own, since the elastic torque is known but
-/// for a factor there. `None` where nothing counts.
+/// Identifies at most `most` terms. `scaled`: each stretch has a scale of its own, since the elastic torque is known
+/// but for a factor there. `None` where nothing counts.
 pub fn identify(stretches: &[Stretch], most: usize, scaled: bool) -> Option<Identified> {
     let mut problem = Problem { stretches, scales: vec![1.0; stretches.len()] };
     let spacing = |stretch: &Stretch| {
@@ -298,7 +297,8 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// A press at some speed, held, and released, felt with `terms`, z by small steps; its torque is `scale` times that.
+    /// A press at some speed, held, and released, felt with `terms`, z by small steps; its torque is `scale` times
+    /// that.
     fn press(terms: &[[f64; 2]], speed: f64, scale: f64, noise: &mut Random) -> Stretch {
         const STEP: f64 = 1e-4;
         let mut z = vec![0.0; terms.len()];

@@ -65,8 +65,8 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// The surface in `file`, which the scene calls `name`, of Young's modulus `young` (Pa), turned about x, then y, then
-    /// z (rad).
+    /// The surface in `file`, which the scene calls `name`, of Young's modulus `young` (Pa), turned about x, then y,
+    /// then z (rad).
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -84,17 +84,26 @@ impl Draft {
         let volume = volumes.sum::<f64>().abs();
         let mass = DENSITY * volume / nodes.len().max(1) as f64;
         let width = SKIN_WIDTH * topology::mean_edge(&nodes, &triangles);
-        let body =
-            Body { name, scale, turn, young, middle: 0.5 * (low + high), height: high.z - low.z, volume, mass, width };
+        let facts = BodyFacts {
+            name,
+            scale,
+            turn,
+            young,
+            middle: 0.5 * (low + high),
+            height: high.z - low.z,
+            volume,
+            mass,
+            width,
+        };
         let mut tables = String::new();
         // Writing to a string fails only where memory does.
-        let _ = body.write(&mut tables);
+        let _ = facts.write(&mut tables);
         Ok(Self { tables, unit })
     }
 }
 
 /// What is known of a body.
-struct Body<'a> {
+struct BodyFacts<'a> {
     name: &'a str,
     scale: f64,
     turn: DVec3,
@@ -109,7 +118,7 @@ struct Body<'a> {
     width: f64,
 }
 
-impl Body<'_> {
+impl BodyFacts<'_> {
     fn write(&self, text: &mut String) -> fmt::Result {
         writeln!(text, "[object]")?;
         let meaning = format!("kg, of each node: the body has {} l, as heavy as water", coarse(1e3 * self.volume));

@@ -151,9 +151,8 @@ impl Object {
 
     /// Builds the object of `spec` on the geometry that a dataset holds of it; no file is read.
     ///
-    /// # Errors
-    /// As for [`Object::build`], except for files; also when one of `spec` and `body` has tetrahedra and the other none,
-    /// or `body` names nodes that it lacks.
+    /// # Errors As for [`Object::build`], except for files; also when one of `spec` and `body` has tetrahedra and the
+    /// other none, or `body` names nodes that it lacks.
     pub fn from_body(spec: &ObjectSpec, body: Body) -> Result<Self, Error> {
         if matches!(spec.shape, Shape::Tetrahedra { .. }) == body.tetrahedra.is_empty() {
             return Err(

@@ -1,8 +1,8 @@
 //! Postures from which an arm can press: where its last link goes most easily, and with which contact node first.
 //!
 //! The contact node of the last link that the joints move most goes fastest along n, the eigenvector of J J^T of the
-//! largest eigenvalue (Yoshikawa 1985). An object on that side of the link, beyond the plane across n through the link's
-//! foremost node, is met by that node first.
+//! largest eigenvalue (Yoshikawa 1985). An object on that side of the link, beyond the plane across n through the
+//! link's foremost node, is met by that node first.
 
 use super::{Chain, Pose};
 use crate::JointVector;

@@ -1,5 +1,5 @@
-//! Motions that press a contact node of an arm into an object and draw it over that, and a grid around them: what a scene
-//! begins with.
+//! Motions that press a contact node of an arm into an object and draw it over that, and a grid around them: what a
+//! scene begins with.
 //!
 //! To press, the joints move along J^T n, by which the node moves along n. To scrape, inverse kinematics takes the node
 //! across n, along the direction in which the joints move it most. The length that everything is measured by is that of
@@ -162,7 +162,8 @@ fn stroke(chain: &Chain, q: JointVector, node: usize, direction: DVec3, length: 
     strokes.into_iter().find_map(|[from, to]| Some([end(from)?, end(to)?]))
 }
 
-/// Returns `coordinate` within the limits of `joint`, to a hundred thousandth of a radian or metre, as a scene shows it.
+/// Returns `coordinate` within the limits of `joint`, to a hundred thousandth of a radian or metre, as a scene shows
+/// it.
 fn within(joint: &JointSpec, coordinate: f64) -> f64 {
     let [lower, upper] = joint.limits;
     ((coordinate * 1e5).round() / 1e5).clamp(lower, upper)

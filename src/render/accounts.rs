@@ -59,8 +59,8 @@ pub struct Accounts {
     /// Energy stored in the object at the first tick. If the dataset does not hold it: zero if the loop began out of
     /// contact; else nothing is known until contact first ends, and what was given by then is taken for it.
     pub first_stored: Option<f64>,
-    /// Energy that the contact torque gave beyond what the object had stored, field_work + stored + relaxed - first: made by the time
-    /// step, and by interpolation unless that has a potential; zero for datasets without energy.
+    /// Energy that the contact torque gave beyond what the object had stored, field_work + stored + relaxed - first:
+    /// made by the time step, and by interpolation unless that has a potential; zero for datasets without energy.
     pub leak: f64,
     /// Energy that the device's port took in: minus the sum of (torque on the device) . (device displacement).
     pub port_work: f64,
@@ -160,8 +160,8 @@ impl Accounts {
         self.proxy_dissipation + self.friction_dissipation + self.control_dissipation - self.stop_work
     }
 
-    /// Books the state at a tick: what the object has stored, if the dataset holds it, and has lost since the tick before;
-    /// and whether it is touched.
+    /// Books the state at a tick: what the object has stored, if the dataset holds it, and has lost since the tick
+    /// before; and whether it is touched.
     pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, (stored, relaxed): (Option<f64>, f64), touched: bool) {
         self.kinetic = kinetic;
         self.spring = spring;

@@ -68,8 +68,8 @@ self_cell::self_cell!(
     }
 );
 
-/// The contact of a scene for which nothing was baked, wherever its holder asks for it: see [`LiveScene`]. One thread at
-/// a time may use it.
+/// The contact of a scene for which nothing was baked, wherever its holder asks for it: see [`LiveScene`]. One thread
+/// at a time may use it.
 pub struct LiveField(SceneWithSession);
 
 impl LiveField {
@@ -85,8 +85,8 @@ impl LiveField {
         self.0.borrow_owner().grid()
     }
 
-    /// The contact at the joint coordinates `q` (rad or m). Where it is larger than what is solved, or `q` is none, that
-    /// of the last configuration that was solved, flagged as unconverged. Never allocates.
+    /// The contact at the joint coordinates `q` (rad or m). Where it is larger than what is solved, or `q` is none,
+    /// that of the last configuration that was solved, flagged as unconverged. Never allocates.
     pub fn sample(&mut self, q: &[f64]) -> Sample {
         self.0.with_dependent_mut(|_, session| session.sample(q).0)
     }

@@ -2,13 +2,14 @@
 //! allocation, no panic.
 //!
 //! At t_k: check the device's position; coupling torque for the device from y_k and x_k; contact torque tau_bar(x_k)
-//! from a dataset, or solved; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in size,
-//! and in rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at the
-//! greatest rate, without a jump; the fault stays, the proxy tied to the last good position, until
+//! from a dataset, or solved; one NPMI step of the proxy to x_{k+1}; energy accounts. The device's torque is limited in
+//! size, and in rate against the torque before it. On a fault (see [`Watchdog`]) its goal is zero, which it reaches at
+//! the greatest rate, without a jump; the fault stays, the proxy tied to the last good position, until
 //! [`Haptics::restart`]. So it is when the passivity observer of the device's port finds that the hand has been given
 //! energy from nowhere ([`Fault::Energy`]).
 //!
-//! What the scene may name beside (channels, controller, friction, relaxation) is decided once, in [`Haptics::new`]; what it does not name has no state and does no work.
+//! What the scene may name beside (channels, controller, friction, relaxation) is decided once, in [`Haptics::new`];
+//! what it does not name has no state and does no work.
 
 pub use super::inputs::Inputs;
 use super::{
@@ -318,8 +319,8 @@ impl Haptics {
         torque
     }
 
-    /// One step of the proxy over `interval` (s), booked; what stopped it. The device moves at `velocity`, and `contact`
-    /// was sampled at the proxy.
+    /// One step of the proxy over `interval` (s), booked; what stopped it. The device moves at `velocity`, and
+    /// `contact` was sampled at the proxy.
     fn move_proxy(
         &self,
         state: &mut State,

@@ -68,8 +68,8 @@ impl LiveScene {
         &self.direct
     }
 
-    /// The region in which the proxy stays: the joints' limits, or where the compliance is known around the scene's grid
-    /// alone, that.
+    /// The region in which the proxy stays: the joints' limits, or where the compliance is known around the scene's
+    /// grid alone, that.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
@@ -98,9 +98,9 @@ impl LiveScene {
     }
 
     /// Greatest stiffness of the torque relative to `slopes` that was seen in shallow contact at the configurations
-    /// looked at: the greatest eigenvalue of `S^-1/2 H S^-1/2`, S = diag(slopes), H = -d tau/d q (1). A step of the loop
-    /// errs by half of H in its direction: where that is negative, and next to a ridge of the depth it has no bound, the
-    /// step takes energy.
+    /// looked at: the greatest eigenvalue of `S^-1/2 H S^-1/2`, S = diag(slopes), H = -d tau/d q (1). A step of the
+    /// loop errs by half of H in its direction: where that is negative, and next to a ridge of the depth it has no
+    /// bound, the step takes energy.
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         let joints = slopes.len();
@@ -115,8 +115,8 @@ impl LiveScene {
     }
 }
 
-/// A grid of few lines over the joints' limits where contact `is_known` anywhere or the scene has no grid, else over that
-/// of the scene's.
+/// A grid of few lines over the joints' limits where contact `is_known` anywhere or the scene has no grid, else over
+/// that of the scene's.
 fn region(scene: &Scene, is_known: bool) -> Grid {
     let axes = scene.proxy.joints.iter().enumerate().map(|(a, joint)| {
         let ends = scene
@@ -132,8 +132,8 @@ fn region(scene: &Scene, is_known: bool) -> Grid {
     Grid { axes: axes.collect() }
 }
 
-/// The tangents at some of `configurations`, spread over them, where there is shallow contact: next to the middle of the
-/// object, where the depth has its ridges, they are as large as one is near.
+/// The tangents at some of `configurations`, spread over them, where there is shallow contact: next to the middle of
+/// the object, where the depth has its ridges, they are as large as one is near.
 fn tangents(model: &Model<'_>, configurations: &[JointVector]) -> Vec<JointMatrix> {
     let mut model = model.clone();
     model.with_tangent = true;

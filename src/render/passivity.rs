@@ -2,8 +2,8 @@
 //! would do.
 //!
 //! - Boundary layer and object, per joint: `Ks <= mu bv / T` (section 3.1); by the discrete energy balance of the step
-//!   it is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the contact torque itself: of a dataset's a bound is known, of one that is
-//!   solved live the greatest of many.
+//!   it is sharp at mu = 2 (`npmi/mod.rs`). The same bound holds for the stiffness of the contact torque itself: of a
+//!   dataset's a bound is known, of one that is solved live the greatest of many.
 //!   Behind a boundary layer both act at right angles: the slope of what is rendered is at most the root of the sum of
 //!   their squares (`field/boundary.rs`), and is compared with the sharp bound 2 bv / T.
 //! - Device, per joint, against its own damping: Colgate's wall, `bd > K T/2 + |Bvc|`, with `K = Kvc`, and

@@ -44,8 +44,6 @@ pub struct Setup {
     pub advice: Option<String>,
     /// The motions that the scene does not name, made from the dataset's own contact.
     pub made_motions: Vec<&'static str>,
-    /// The scene, where it is solved live.
-    live: Option<Arc<LiveScene>>,
 }
 
 impl Setup {
@@ -105,7 +103,7 @@ impl Setup {
             },
         };
         let haptics = Arc::new(haptics);
-        Ok(Self { scene, chain, haptics, object, bounds, exceeded, advice, made_motions, live })
+        Ok(Self { scene, chain, haptics, object, bounds, exceeded, advice, made_motions })
     }
 
     /// Returns the haptic loop of `dataset`, from which this was made, with `gains` in the place of the scene's; and
@@ -114,7 +112,7 @@ impl Setup {
     /// # Errors
     /// When they do not make a loop.
     pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<String>), Error> {
-        let live = self.live.as_ref();
+        let live = self.haptics.source().live();
         let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, live)?;
         Ok((haptics, advice))
     }
@@ -144,7 +142,7 @@ impl Setup {
     /// When the dataset's do not fit the object.
     pub fn contact_forces(&self, dataset: &Dataset) -> Result<Option<ContactForces>, Error> {
         let Some(object) = &self.object else { return Ok(None) };
-        Ok(Some(match &self.live {
+        Ok(Some(match self.haptics.source().live() {
             Some(scene) => ContactForces::live(Arc::clone(scene)),
             None => ContactForces::new(dataset, object.rest.len())?,
         }))

@@ -41,6 +41,15 @@ impl TorqueSource {
         }
     }
 
+    /// The scene that is solved in every tick.
+    #[must_use]
+    pub fn live(&self) -> Option<&Arc<LiveScene>> {
+        match self {
+            Self::Dataset(_) => None,
+            Self::Live(scene) => Some(scene),
+        }
+    }
+
     /// Number of joints d.
     #[must_use]
     pub fn joints(&self) -> usize {

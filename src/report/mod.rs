@@ -12,18 +12,20 @@ pub mod slices;
 pub mod space;
 
 use crate::{
-    MAX_AXES,
     dataset::{Dataset, replace_file},
     draw::canvas::{Canvas, PictureError},
     proxy::Chain,
-    render::trace::Trace,
+    render::{live::LiveScene, trace::Trace},
 };
 use rayon::prelude::*;
 use std::{
     io::Write,
     ops::Deref,
     path::{Path, PathBuf},
-    sync::mpsc::{self, RecvTimeoutError},
+    sync::{
+        Arc,
+        mpsc::{self, RecvTimeoutError},
+    },
     time::Duration,
 };
 
@@ -99,20 +101,20 @@ impl<'a> Figure<'a> {
     }
 }
 
-/// Returns all figures that the data allow.
+/// Returns all figures that the data allow. `live`: the scene of a recording whose contact was solved in every tick, of
+/// which the dataset holds nothing.
 ///
-/// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset; with a recording of the proxy `chain` also
+/// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset, where it holds something; with a recording of the proxy `chain` also
 /// `motion.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints of which the last link alone touches
 /// `force.{svg,png}` (Fig. 8) and, where it has frames and the dataset a surface, `object.png` (Fig. 6).
-pub fn figures<'a, D, C, T>(dataset: &D, recording: Option<(&C, &T)>) -> Vec<Figure<'a>>
+pub fn figures<'a, D, C, T>(dataset: &D, recording: Option<(&C, &T)>, live: Option<&Arc<LiveScene>>) -> Vec<Figure<'a>>
 where
     D: Deref<Target = Dataset> + Clone + Send + 'a,
     C: Deref<Target = Chain> + Clone + Send + 'a,
     T: Deref<Target = Trace> + Clone + Send + 'a,
 {
     let mut figures = Vec::new();
-    // Of a live scene with more joints nothing is stored.
-    if dataset.grid.joints() <= MAX_AXES {
+    if live.is_none() {
         let shown = dataset.clone();
         figures.push(Figure::picture("cspace", move || Ok(space::space(&shown))));
         let shown = dataset.clone();
@@ -128,9 +130,9 @@ where
         figures.push(Figure::drawing("force", move || force::force(&[end], &shown)));
     }
     if !trace.frames.is_empty() && dataset.surface.is_some() {
-        let (dataset, chain, trace) = (dataset.clone(), chain.clone(), trace.clone());
+        let (dataset, chain, trace, live) = (dataset.clone(), chain.clone(), trace.clone(), live.cloned());
         figures.push(Figure::picture("object", move || {
-            let instants = object::instants(&dataset, &chain, &trace, INSTANTS)?;
+            let instants = object::instants(&dataset, &chain, &trace, INSTANTS, live)?;
             object::object(&dataset, &chain, &instants)
         }));
     }
@@ -148,7 +150,7 @@ pub fn write_figures(
     recording: Option<(&Chain, &Trace)>,
 ) -> Result<Vec<PathBuf>, ReportError> {
     let recording = recording.as_ref().map(|(chain, trace)| (chain, trace));
-    let figures = figures(&dataset, recording);
+    let figures = figures(&dataset, recording, None);
     let files: Vec<PathBuf> = figures.iter().flat_map(|figure| figure.files(folder)).collect();
     let (told, written) = mpsc::channel();
     write_all(folder, figures, &told);

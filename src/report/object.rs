@@ -17,12 +17,14 @@ use crate::{
     proxy::{Chain, Pose, Triangles, shape_frame, shape_triangles},
     render::{
         graphics::ContactForces,
+        live::LiveScene,
         trace::{Frame, Trace},
     },
     scene::Rendering,
 };
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The object and the proxy at one instant.
 pub struct Instant {
@@ -49,11 +51,17 @@ const COLUMNS: usize = 3;
 const CELL: [f64; 2] = [226.0, 200.0];
 
 /// `count` instants of a recording: from the frame before the first contact to that of the last, evenly. Frames every
-/// 50 ms or closer leave something to choose from.
+/// 50 ms or closer leave something to choose from. `live`: the scene, where its contact was solved in every tick.
 ///
 /// # Errors
 /// [`ReportError::Data`] when frames, dataset and chain do not belong together.
-pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -> Result<Vec<Instant>, ReportError> {
+pub fn instants(
+    dataset: &Dataset,
+    chain: &Chain,
+    trace: &Trace,
+    count: usize,
+    live: Option<Arc<LiveScene>>,
+) -> Result<Vec<Instant>, ReportError> {
     let refused = |reason: String| ReportError::Data { figure: "the deformed object", reason };
     if chain.joints.len() != dataset.grid.joints() {
         let (joints, axes) = (chain.joints.len(), dataset.grid.joints());
@@ -70,7 +78,10 @@ pub fn instants(dataset: &Dataset, chain: &Chain, trace: &Trace, count: usize) -
     let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
     let mut pose = chain.new_pose();
     let nodes = frames.iter().map(|frame| frame.nodes.len()).max().unwrap_or(0);
-    let all = ContactForces::known(dataset).then(|| ContactForces::new(dataset, nodes)).transpose();
+    let all = match live {
+        Some(scene) => Ok(Some(ContactForces::live(scene))),
+        None => ContactForces::known(dataset).then(|| ContactForces::new(dataset, nodes)).transpose(),
+    };
     let all = all.map_err(|error| refused(error.to_string()))?;
     chosen
         .map(|frame| {

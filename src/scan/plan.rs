@@ -4,8 +4,8 @@
 //! line, every other row of lines backwards so that neighbours in time are neighbours in space. A plan over joints goes
 //! through its grid row by row, every other row backwards.
 //!
-//! After some of the lines come presses that are recorded ([`crate::scene::HistorySpec`]): in to the line's last level but one, held, aside and back
-//! along both axes across, and out again.
+//! After some of the lines come presses that are recorded ([`crate::scene::HistorySpec`]): in to the line's last level
+//! but one, held, aside and back along both axes across, and out again.
 
 use crate::proxy::inverse_kinematics::reach;
 use crate::{
@@ -22,7 +22,7 @@ const STROKES: [f64; 4] = [1.0, -1.0, 1.0, 0.0];
 const SCAN_POINTS: usize = 1_000_000;
 
 /// The golden ratio less one, whose multiples spread evenly however many follow.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
+const GOLDEN: f64 = std::f64::consts::GOLDEN_RATIO - 1.0;
 
 /// What is wrong with a plan of which nothing can be reached.
 const NOTHING_REACHABLE: &str =

@@ -2,8 +2,9 @@
 //!
 //! The commanded position goes from stop to stop in straight lines of C-space at the scan's speed, all joints arriving
 //! together, and rests for the dwell time where something is to be measured: a point gives two rows, arrival and
-//! departure. A press that is recorded has its own speed, and rests for as long as it is held. Such a controller does not wait until contact is steady, as `haptize scan` does: the dwell time must be
-//! long enough for the object to relax.
+//! departure. A press that is recorded has its own speed, and rests for as long as it is held. Such a controller does
+//! not wait until contact is steady, as `haptize scan` does: the dwell time must be long enough for the object to
+//! relax.
 
 use super::{Plan, Stop, plan::PressRecord};
 use crate::{

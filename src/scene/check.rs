@@ -23,7 +23,10 @@ const TABLES: &str = "object object.sphere object.mesh object.tetrahedra object.
 
 /// Keys that earlier versions read, and what to do without them.
 const REMOVED: [(&str, &str); 2] = [
-    ("haptics.contact_damping", "contact_damping is no more: leave it out, or give the coupling more coupling_damping"),
+    (
+        "haptics.contact_damping",
+        "contact_damping was removed: leave it out, or give the coupling more coupling_damping",
+    ),
     ("haptics.friction.damping", "friction has no damping of its own any more, the coupling's damps it: leave it out"),
 ];
 

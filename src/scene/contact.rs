@@ -10,10 +10,10 @@ use serde::de::{Deserialize, Deserializer, Error, IgnoredAny};
 const FORMER_LAWS: [(&str, &str); 2] = [
     (
         "linearised",
-        "the law \"linearised\" is no more, its torque was not the gradient of its energy: take law = \"rest\", or leave \
+        "the law \"linearised\" was removed: its torque was not the gradient of its energy. Take law = \"rest\", or leave \
          it out",
     ),
-    ("paper", "the paper's iteration is no law of a scene, `haptize paper` alone solves by it: leave law out"),
+    ("paper", "a scene cannot name the paper's iteration: only `haptize paper` solves by it. Leave law out"),
 ];
 
 /// Keys that name the law of contact: the last two in former scenes.
@@ -47,7 +47,7 @@ pub(super) struct ContactTable {
     stiffness: f64,
     #[serde(default, deserialize_with = "positive")]
     stiffness_per_length: Option<f64>,
-    /// What to do where it is one that is no more. Former scenes named it by `geometry` or `algorithm`.
+    /// What to do where it is one that was removed. Former scenes named it by `geometry` or `algorithm`.
     #[serde(default = "default_law", deserialize_with = "law", alias = "geometry", alias = "algorithm")]
     law: Result<ContactLaw, &'static str>,
     #[serde(default = "tolerance", deserialize_with = "share")]
@@ -56,7 +56,7 @@ pub(super) struct ContactTable {
     max_iterations: u32,
     #[serde(default)]
     surface: ContactSurface,
-    /// Of a law that is no more.
+    /// Of a law that was removed.
     updates: Option<IgnoredAny>,
 }
 

@@ -173,7 +173,7 @@ impl Scene {
     /// The scene of a dataset: its `text`, with the law of contact by which the dataset says that it was solved.
     ///
     /// # Errors
-    /// When the scene is not valid, or the law is no more; the message names the remedy.
+    /// When the scene is not valid, or the law was removed; the message names the remedy.
     pub fn of_dataset(text: &str, path: impl AsRef<Path>, law: &str) -> Result<Self, SceneError> {
         let mut scene = Self::parse(text, &path)?;
         scene.contact.law = ContactLaw::from_str(law, true).map_err(|_| {

@@ -164,7 +164,8 @@ pub(crate) fn sweep_of<'a>(
 const SAMPLES: usize = 1 << 16;
 
 /// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it
-/// leaves the grid out, at random where the arm has more joints than a grid has axes: what [`Model::reaching`] looks at.
+/// leaves the grid out, at random where the arm has more joints than a grid has axes: what [`Model::reaching`] looks
+/// at.
 #[must_use]
 pub fn sample(scene: &Scene) -> Vec<JointVector> {
     let joints = &scene.proxy.joints;

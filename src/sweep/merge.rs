@@ -145,8 +145,8 @@ impl Merge {
     /// Puts the dataset `output` together, with its error measured at `measured` configurations as in
     /// [`super::Bake::measured`]. What an interrupted merge has left is continued.
     ///
-    /// # Errors
-    /// When shards are missing, the output cannot be written, or the merge is stopped; an earlier file `output` is then untouched.
+    /// # Errors When shards are missing, the output cannot be written, or the merge is stopped; an earlier file
+    /// `output` is then untouched.
     pub fn to_file(
         &self,
         output: &Path,

@@ -199,8 +199,8 @@ impl Part {
         let map = part.map().map_err(failed)?;
         let (tally, end) = match part.found(&map)? {
             Some(found) if !resume && found.results < map.len() => {
-                let what = "holds what an unfinished bake has solved; add --resume to go on with it, or delete it to begin \
-                            anew";
+                let what = "holds what an unfinished bake has solved; add --resume to go on with it, or delete it to start \
+                            again";
                 return Err(Error::at(path, what));
             }
             Some(found) if resume => {

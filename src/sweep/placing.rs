@@ -75,7 +75,8 @@ impl Placing {
     }
 
     /// Moves the object of `scene` before the tip of its arm, to be pressed from above where the arm does that easily.
-    /// Returns its motion (m), and what arm and object are to each other there; `None` where the arm has no contact node.
+    /// Returns its motion (m), and what arm and object are to each other there; `None` where the arm has no contact
+    /// node.
     ///
     /// # Errors
     /// When the object is refused.
@@ -109,7 +110,8 @@ impl Placing {
         Ok(Some((motion, Self { centre: scene.object.shape.centre() + motion, ..placing })))
     }
 
-    /// The same for `object`, which was built of the scene and perhaps moved; begins from `posture`, where there is one.
+    /// The same for `object`, which was built of the scene and perhaps moved; begins from `posture`, where there is
+    /// one.
     fn from(scene: &Scene, object: &Object, wanted: Option<DVec3>, posture: Option<&Posture>) -> Result<Self, Error> {
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
@@ -127,7 +129,7 @@ impl Placing {
         let point = surface.centre + surface.facet_at_rest(closest.triangle).point(closest.point.weights);
         let normal = surface.pseudonormal_at_rest(closest.triangle, &closest.point).normalize_or(DVec3::Z);
         let standoff = PRESS_GAP * length;
-        let aim = Aim { point, normal, standoff };
+        let stand = Stand { point, normal, standoff };
         let (mut random, mut proximity) = (Random::new(SEED), Proximity::new(&model));
         let mut best: Option<Attempt> = None;
         for number in 0..POSTURES {
@@ -136,7 +138,7 @@ impl Placing {
                 let joints = start.iter_mut().zip(&chain.joints);
                 joints.for_each(|(q, joint)| *q = random.between(joint.limits[0], joint.limits[1]));
             }
-            let attempt = aim.attempt(&mut proximity, tip, start);
+            let attempt = stand.attempt(&mut proximity, tip, start);
             if best.as_ref().is_none_or(|best| attempt.is_better(best, standoff)) {
                 best = Some(attempt);
             }
@@ -177,7 +179,7 @@ impl Placing {
 }
 
 /// Where a contact node is to stand before a surface.
-struct Aim {
+struct Stand {
     point: DVec3,
     normal: DVec3,
     standoff: f64,
@@ -194,7 +196,7 @@ struct Attempt {
     gap: f64,
 }
 
-impl Aim {
+impl Stand {
     /// Takes contact node `tip` there, beginning at `start`. Where another node of its link is then nearer to the
     /// object, that one is the tip.
     fn attempt(&self, proximity: &mut Proximity<'_>, mut tip: usize, start: JointVector) -> Attempt {

@@ -1,7 +1,7 @@
 //! A soft ball within reach of an arm, a grid around it and a motion that presses it: what completes a scene.
 //!
-//! The ball lies before the arm's last link, tangent to the plane across the direction in which the link presses but for
-//! a small gap.
+//! The ball lies before the arm's last link, tangent to the plane across the direction in which the link presses but
+//! for a small gap.
 
 use crate::proxy::{Chain, PRESS_GAP, Posture, Press};
 use glam::DVec3;

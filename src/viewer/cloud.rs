@@ -16,7 +16,7 @@ use crate::{
     draw::{camera::Camera, colour::ColourMap},
     report::slices::{torque_size, torque_size_label},
 };
-use eframe::egui::{self, Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
+use eframe::egui::{self, Align2, Color32, Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
 use glam::{DVec2, DVec3};
 
 /// From where it is seen at first (rad): a little more from the side than the 3-D scene, so that all three names show.
@@ -137,7 +137,10 @@ impl Cloud {
         gradient(&painter, bar, map);
         let (text, small) = (ui.visuals().text_color(), theme::small());
         let title = torque_size_label(dataset);
-        painter.text(bar.center_top() + vec2(0.0, -FINE_GAP), Align2::CENTER_BOTTOM, title, small.clone(), text);
+        let title = painter.layout_no_wrap(title, small.clone(), text);
+        // In the middle over the bar, where that leaves it in the picture.
+        let left = (bar.center().x - 0.5 * title.size().x).min(rect.right() - GAP - title.size().x);
+        painter.galley(pos2(left, bar.top() - FINE_GAP - title.size().y), title, text);
         painter.text(bar.left_bottom() + vec2(0.0, FINE_GAP), Align2::CENTER_TOP, "0", small.clone(), text);
         painter.text(
             bar.right_bottom() + vec2(-FINE_GAP, FINE_GAP),

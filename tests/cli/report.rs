@@ -282,7 +282,7 @@ fn all(dataset: &Dataset, chain: &Chain, trace: &Trace) -> Vec<(&'static str, Ca
         ("energy", report::press::energy(trace)),
     ];
     if !trace.frames.is_empty() {
-        let instants = report::object::instants(dataset, chain, trace, 6).unwrap();
+        let instants = report::object::instants(dataset, chain, trace, 6, None).unwrap();
         figures.push(("object", report::object::object(dataset, chain, &instants).unwrap()));
     }
     figures
@@ -549,7 +549,7 @@ fn figures_are_left_out_when_there_is_no_time_for_them_and_told() {
     let trace = Arc::new(recording(&chain, &object, 20));
     let dataset = Arc::new(dataset(&chain, &object, counts(3)));
     let drawn = |name: &str, is_late: bool| {
-        let figures = report::figures(&dataset, Some((&chain, &trace)));
+        let figures = report::figures(&dataset, Some((&chain, &trace)), None);
         report::write_until(|| is_late, &folder(name), figures).unwrap()
     };
     let all = drawn("in time", false);

@@ -4,3 +4,4 @@
 
 pub mod desktop;
 pub mod program;
+pub mod scanned;

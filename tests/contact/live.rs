@@ -78,7 +78,8 @@ fn live_contact_is_that_of_the_solver_wherever_it_comes_from() {
 /// Steps of central differences (rad).
 const STEP: f64 = 1e-6;
 
-/// With twelve joints, too many for a grid: the torque is minus the gradient of the energy, the tangent that of the torque.
+/// With twelve joints, too many for a grid: the torque is minus the gradient of the energy, the tangent that of the
+/// torque.
 #[test]
 fn an_arm_of_twelve_joints_is_pushed_down_the_gradient_of_the_energy() {
     let scene = Scene::parse(include_str!("../scenes/snake.toml"), "snake.toml").unwrap();

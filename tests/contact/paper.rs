@@ -1,16 +1,14 @@
 //! The paper's section 4.1 with its own iteration, and the comparison with the paper's numbers.
+use crate::common::scanned::scanned;
 use haptize::{
     dataset::Dataset,
     device::Motion,
     gridize::{GridizeOptions, Interpolation, gridize},
     paper::{Comparison, Row, Scanned, Scans, Sphere, Value, baked, procedure, specimen},
-    proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
-    scan::{LogHeader, LogWriter, Plan, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{PlanSpec, ScanScene, Scene, Waypoint},
     sweep::SweepReport,
 };
-use std::sync::atomic::AtomicBool;
 
 fn paper() -> Scene {
     Scene::parse(include_str!("../../datasets/paper.toml"), "paper.toml").unwrap()
@@ -62,32 +60,7 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     let mut part = ScanScene::parse(include_str!("../../datasets/sponge.toml"), "sponge.toml").unwrap();
     let PlanSpec::Workspace(plan) = &mut part.scan.plan else { unreachable!() };
     (plan.start.y, plan.across[0].count, plan.across[1].count) = (-0.012, 5, 8);
-    let chain = Chain::new(&part.proxy);
-    let plan = Plan::new(&part.scan, &chain).unwrap();
-    let mut rig = SimulatedRig::new(&part.proxy, &part.scan.simulated, plan.stops[0].q, 1);
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("log.csv");
-    let header = LogHeader {
-        rig: rig.description(),
-        simulated: true,
-        guided: false,
-        joints: labels(&chain),
-        scene: part.text.clone(),
-    };
-    let mut log = LogWriter::create(&file, &header).unwrap();
-    let stop = AtomicBool::new(false);
-    let mut session = Session {
-        spec: &part.scan,
-        chain: &chain,
-        device: &mut rig,
-        against_time: false,
-        header: &header,
-        log: &mut log,
-        stop: &stop,
-        progress: &mut |_| {},
-    };
-    assert!(session.scan(&plan, &[]).unwrap().whole);
-    let samples = ScanLog::read(&file).unwrap().samples();
+    let samples = scanned(&part, 1);
     let options =
         GridizeOptions { steps: vec![0.03], epsilon: Some(0.01), interpolation: Interpolation::Linear, smooth: false };
     let (mut block, report) = gridize(&samples, &options).unwrap();

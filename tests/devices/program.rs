@@ -285,8 +285,8 @@ fn slides() -> tempfile::TempDir {
     folder
 }
 
-/// Plays in `folder` with an emulated 2DIY, and sends `signals` once it is pushed, all at once. Returns what came of it, when the
-/// signal was sent, and the commands.
+/// Plays in `folder` with an emulated 2DIY, and sends `signals` once it is pushed, all at once. Returns what came of
+/// it, when the signal was sent, and the commands.
 #[cfg(unix)]
 fn signalled(folder: &Path, signals: &'static [Signal]) -> (std::process::Output, Instant, Sent) {
     use std::{os::unix::process::CommandExt, process::Stdio};

@@ -1,5 +1,6 @@
 //! Real objects from the first touch to the hand (sections 2.2, 2.3 and 4.2): the simulated spongy block, scanned,
 //! gridized and felt, and the logs of a real instrument where they are at hand.
+use crate::common::scanned::scanned;
 use glam::DVec3;
 use haptize::{
     dataset::Dataset,
@@ -9,13 +10,11 @@ use haptize::{
         prediction::{held_out, predict},
     },
     logs::{Imported, Keep, Mapping, import},
-    proxy::Chain,
     render::{session, setup::Setup, trace::Trace},
     report::force::EndForce,
-    scan::{LogHeader, LogWriter, Plan, ScanLog, Session, labels, simulated::SimulatedRig},
     scene::{PlanSpec, ScanScene, Waypoint, WorkspacePlan},
 };
-use std::{path::PathBuf, sync::atomic::AtomicBool};
+use std::path::PathBuf;
 
 const SEED: u64 = 1;
 
@@ -29,33 +28,7 @@ fn haptized(name: &str, part: impl FnOnce(&mut WorkspacePlan)) -> Dataset {
     let mut scene = ScanScene::load(path).unwrap();
     let PlanSpec::Workspace(plan) = &mut scene.scan.plan else { unreachable!() };
     part(plan);
-    let chain = Chain::new(&scene.proxy);
-    let plan = Plan::new(&scene.scan, &chain).unwrap();
-    let mut rig = SimulatedRig::new(&scene.proxy, &scene.scan.simulated, plan.stops[0].q, SEED);
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("log.csv");
-    let header = LogHeader {
-        rig: rig.description(),
-        simulated: true,
-        guided: false,
-        joints: labels(&chain),
-        scene: scene.text.clone(),
-    };
-    let mut log = LogWriter::create(&file, &header).unwrap();
-    let report = Session {
-        spec: &scene.scan,
-        chain: &chain,
-        device: &mut rig,
-        against_time: false,
-        header: &header,
-        log: &mut log,
-        stop: &AtomicBool::new(false),
-        progress: &mut |_| {},
-    }
-    .scan(&plan, &[])
-    .unwrap();
-    assert!(report.whole && report.simulated && report.steady == report.points, "{report:?}");
-    let samples = ScanLog::read(&file).unwrap().samples();
+    let samples = scanned(&scene, SEED);
     let (mut dataset, _) = gridize(&samples, &options(0.03, scene.scan.control.epsilon)).unwrap();
     dataset.scene = scene.text;
     dataset

@@ -9,9 +9,9 @@
 //! tension S held at distance R: `F = 2 pi S d / ln(R / r)`: small for foam alone, large for a fabric. That is what
 //! makes the cover stiffer.
 //!
-//! **Viscous.** Overstress relaxes: a Maxwell branch for each term of the specimen, `dq_k/dt = G_k dFe/dt - q_k / theta_k`
-//! (quasi-linear viscoelasticity, Fung 1981), G_k the term's share over that of the force that lasts. A node that retracts faster than the foam recovers loses contact: force is never
-//! negative.
+//! **Viscous.** Overstress relaxes: a Maxwell branch for each term of the specimen, `dq_k/dt = G_k dFe/dt - q_k /
+//! theta_k` (quasi-linear viscoelasticity, Fung 1981), G_k the term's share over that of the force that lasts. A node
+//! that retracts faster than the foam recovers loses contact: force is never negative.
 //!
 //! **Friction.** Where a node first touches a face it sticks; the tangential spring slides at mu times the normal
 //! force.

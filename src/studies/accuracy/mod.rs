@@ -75,7 +75,8 @@ pub struct Row {
     pub bytes: usize,
     /// Time over that of the scene's own bake, of a look-up by `linear`, or of a configuration of the scene as it is.
     pub cost: f64,
-    /// Root mean square of the error (the study's `norm`). Of mesh, nodes, skin and contact compliance: distance from the next row.
+    /// Root mean square of the error (the study's `norm`). Of mesh, nodes, skin and contact compliance: distance from
+    /// the next row.
     pub rms: f64,
     /// Greatest error (the study's `norm`).
     pub worst: f64,
@@ -177,8 +178,8 @@ fn unit(scene: &Scene) -> &'static str {
     }
 }
 
-/// Least time of `rounds` runs, at least one, of each of `count` kinds of work (s), and the last result. They take turns,
-/// to and fro: what else a busy machine does falls on all alike.
+/// Least time of `rounds` runs, at least one, of each of `count` kinds of work (s), and the last result. They take
+/// turns, to and fro: what else a busy machine does falls on all alike.
 fn in_turns<T, E>(
     rounds: usize,
     count: usize,

@@ -110,7 +110,7 @@ fn an_effect_that_cannot_act_is_refused_with_its_line() {
         ("[haptics.friction]\nstiffness = 1.0", "coefficient"),
         ("[haptics.friction]\ncoefficient = -0.1", "coefficient is -0.1: it must be positive"),
         ("[haptics.friction]\ncoefficient = 0.1\ndamping = 1.0", "friction has no damping of its own any more"),
-        ("[haptics]\ncontact_damping = 1.0", "contact_damping is no more: leave it out"),
+        ("[haptics]\ncontact_damping = 1.0", "contact_damping was removed: leave it out"),
         (
             "[haptics]\nfour_channel = { channels = [0.0, 1.0, 1.0, 1.5] }",
             "channels is 1.5: it must be between 0 and 1",

@@ -1,7 +1,10 @@
 //! A scene that is solved in every tick: energy, repeatability, and what happens where contact is not solved.
 
 use super::*;
-use haptize::render::{live::LiveScene, watchdog::GREATEST_POSITION_AGE};
+use haptize::{
+    render::{live::LiveScene, watchdog::GREATEST_POSITION_AGE},
+    report::object::instants,
+};
 use std::sync::Arc;
 
 /// The shipped scene of this name, or the tests' own arm of twelve joints, after `edit`, ready to be felt.
@@ -82,4 +85,22 @@ fn gains_that_a_live_scene_leaves_free_follow_from_its_tangents() {
     };
     assert!(stiffness(&setup) > 0.0 && stiffness(&setup) <= 1.0, "{}", stiffness(&setup));
     assert!(stiffness(&bounded) * 0.015 - stiffness(&setup) * damping(&setup) < 1e-12);
+}
+
+/// Nothing is stored of a live scene: the picture of the object shows forces that are solved for it, not zeros.
+#[test]
+fn the_picture_of_a_live_session_has_the_forces() {
+    let (dataset, setup) = live("touch", |text| text);
+    let scene = setup.haptics.source().live().unwrap();
+    let press = Motion::through(&setup.scene.motion.press, 3).unwrap();
+    let mut graphics = setup.graphics(&dataset).unwrap().unwrap();
+    let plan = setup.plan(&dataset, press.duration(), 60);
+    let mut hand = setup.hand(press).unwrap();
+    let trace = session::run(&setup.haptics, &mut hand, Some(&mut graphics), &plan).unwrap();
+
+    let instants = instants(&dataset, &setup.chain, &trace, 6, Some(Arc::clone(scene))).unwrap();
+    let touching = instants.iter().filter(|instant| instant.contact_nodes > 0);
+    let forces = touching.map(|instant| instant.forces.iter().map(|on| on.force).sum::<DVec3>().length());
+    let forces: Vec<f64> = forces.collect();
+    assert!(forces.len() > 2 && forces.iter().all(|force| *force > 1e-3), "{forces:?}");
 }
