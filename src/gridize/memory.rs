@@ -13,7 +13,7 @@ use super::{
     relaxation::{Identified, Stretch, identify},
 };
 use crate::{
-    Error, JointVector, MAX_JOINTS,
+    Error, JointVector, MAX_AXES,
     dataset::{Dataset, IdentifiedRelaxation, JointLabel},
     error,
     field::{Flags, TorqueField},
@@ -155,7 +155,7 @@ fn stretches(dataset: &Dataset, histories: &[ForceHistory]) -> Result<Vec<Stretc
 /// share `left` of each row, weighted by that share's square as noise is.
 fn fresh(joints: &[JointLabel], histories: &[ForceHistory], left: &[Vec<f64>], steps: &[f64]) -> Samples {
     let count = joints.len();
-    let mut cells: BTreeMap<[i64; MAX_JOINTS], (f64, Vec<f64>)> = BTreeMap::new();
+    let mut cells: BTreeMap<[i64; MAX_AXES], (f64, Vec<f64>)> = BTreeMap::new();
     for (number, history) in histories.iter().enumerate() {
         let rows = history.configurations.chunks_exact(count).zip(history.torques.chunks_exact(count));
         for (row, (q, torque)) in rows.enumerate() {
@@ -163,7 +163,7 @@ fn fresh(joints: &[JointLabel], histories: &[ForceHistory], left: &[Vec<f64>], s
             if left < LEAST_LEFT {
                 continue;
             }
-            let mut cell = [0; MAX_JOINTS];
+            let mut cell = [0; MAX_AXES];
             cell.iter_mut().zip(q).enumerate().for_each(|(joint, (cell, q))| {
                 *cell = (q / steps[joint % steps.len()]).floor() as i64;
             });

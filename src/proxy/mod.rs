@@ -21,5 +21,6 @@ pub use chain::{Chain, Node, Pose};
 pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere};
 pub use dynamics::Dynamics;
 pub use links::Links;
+pub(crate) use posture::outer;
 pub use posture::{Posture, of_last_link};
 pub use press::{PRESS_GAP, Press};

@@ -81,6 +81,6 @@ pub(super) fn largest(square: DMat3, from: DVec3) -> DVec3 {
 }
 
 /// a a^T.
-pub(super) fn outer(a: DVec3) -> DMat3 {
+pub fn outer(a: DVec3) -> DMat3 {
     DMat3::from_cols(a * a.x, a * a.y, a * a.z)
 }

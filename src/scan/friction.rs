@@ -12,7 +12,7 @@ use crate::{
     dataset::{Dataset, IdentifiedFriction, SlipColumns},
     gridize::ForceHistory,
     joint_matrix::{entries, lower},
-    proxy::Chain,
+    proxy::{Chain, outer},
     scene::{PlanSpec, ScanSpec},
 };
 use glam::{DMat3, DVec3};
@@ -91,7 +91,7 @@ fn slip(chain: &Chain, node: usize, q: &[f64], torque: &JointVector) -> Option<S
     let columns = chain.node_jacobian(&links, node, chain.node_position(&links, node));
     let (mut square, mut right) = (DMat3::ZERO, DVec3::ZERO);
     for (column, torque) in columns.iter().zip(torque.iter()) {
-        square += DMat3::from_cols(*column * column.x, *column * column.y, *column * column.z);
+        square += outer(*column);
         right += *column * *torque;
     }
     let size = (square.x_axis.x + square.y_axis.y + square.z_axis.z) / 3.0;

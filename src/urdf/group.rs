@@ -1,6 +1,7 @@
 //! Links that do not move against each other, as one body.
 
 use super::{Inertial, Link, Placed, Robot};
+use crate::proxy::outer;
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Rigidly joined links.
@@ -40,8 +41,7 @@ impl Group {
         let centre = if mass > 0.0 { moment / mass } else { DVec3::ZERO };
         let about_centre = |own: &Inertial| {
             let d = own.centre - centre;
-            let outer = DMat3::from_cols(d * d.x, d * d.y, d * d.z);
-            own.inertia + own.mass * (DMat3::from_diagonal(DVec3::splat(d.length_squared())) - outer)
+            own.inertia + own.mass * (DMat3::from_diagonal(DVec3::splat(d.length_squared())) - outer(d))
         };
         let inertia = self.inertials.iter().map(about_centre).fold(DMat3::ZERO, |sum, term| sum + term);
         Inertial { mass, centre, inertia: 0.5 * (inertia + inertia.transpose()) }
