@@ -180,13 +180,13 @@ fn lines_of_nodes_include_both_ends() {
     assert!(nodes.iter().all(|node| node.radius == 0.01));
 }
 
-/// A dataset holds its scene: one that was solved by a law that is no more still opens.
+/// A dataset holds its scene: one that was solved by a removed law still opens.
 #[test]
 fn a_scene_of_a_former_law_is_drawn_and_felt_but_not_solved() {
     let text = LEAST.replace("stiffness = 1000", "stiffness = 1000\nalgorithm = \"linearised\"\nupdates = 2");
     assert!(Rendering::parse(&text, "least.toml").is_ok());
     let text = text.replace("updates = 2", "");
-    assert!(parse(&text).unwrap_err().to_string().contains("take law = \"rest\""));
+    assert!(parse(&text).unwrap_err().to_string().contains("Take law = \"rest\""));
 }
 
 #[test]
@@ -319,7 +319,7 @@ const BROKEN: &[Broken] = &[
         "stiffness = 1000",
         "stiffness = 1000\nalgorithm = \"linearised\"",
         "linearised",
-        &["no more", "take law = \"rest\""],
+        &["was removed", "Take law = \"rest\""],
     ),
     (
         "stiffness = 1000",
@@ -332,7 +332,7 @@ const BROKEN: &[Broken] = &[
         "stiffness = 1000",
         "stiffness = 1000\nlaw = \"paper\"",
         "law = \"paper\"",
-        &["no law of a scene", "`haptize paper`", "leave law out"],
+        &["only `haptize paper` solves by it", "`haptize paper`", "Leave law out"],
     ),
     ("stiffness = 1000", "", "[contact]", &["no stiffness", "stiffness_per_length"]),
     ("stiffness = 1000", "stiffness_per_length = 1e5", "per_length = 1e5", &["{ at = .. }", "of each node instead"]),
