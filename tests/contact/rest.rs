@@ -319,11 +319,13 @@ fn every_configuration_has_its_equilibrium_within_few_steps() {
     }
 }
 
-/// Solves `count` random configurations of bodies of every kind, of shipped scenes and of a bar that is pressed as deep as
-/// a body's middle, with contact from soft to rigid.
-fn solve_at_random(count: usize) {
+/// Random configurations of bodies of every kind, of shipped scenes and of a bar that is pressed as deep as a body's
+/// middle, with contact from soft to rigid.
+#[test]
+fn a_hundred_thousand_random_configurations_are_solved_in_few_steps() {
+    const COUNT: usize = 110_000;
     const STIFFNESSES: [f64; 8] = [10.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
-    let each = count / (11 * STIFFNESSES.len());
+    let each = COUNT / (11 * STIFFNESSES.len());
     let mut samples = Vec::from(bodies_of_all_kinds(each));
     samples.extend(["sphere", "mesh", "touch", "organ", "woodenhaptics"].map(|name| shipped(name, each)));
     for (name, radius) in [("bar", 0.0), ("bar of balls", 0.004)] {
@@ -349,19 +351,8 @@ fn solve_at_random(count: usize) {
         }
     }
     println!("{solved} solved, {in_contact} in contact: at most {most} steps, residual {residual:.1e}");
-    assert!(solved * 10 > count * 9 && in_contact * 4 > solved, "{solved} {in_contact}");
+    assert!(solved * 10 > COUNT * 9 && in_contact * 4 > solved, "{solved} {in_contact}");
     assert!(most <= 60 && residual < 1e-11, "{most} {residual}");
-}
-
-#[test]
-fn random_configurations_are_solved_in_few_steps() {
-    solve_at_random(10_000);
-}
-
-#[test]
-#[ignore = "minutes"]
-fn a_hundred_thousand_random_configurations_are_solved_in_few_steps() {
-    solve_at_random(110_000);
 }
 
 /// At the depths of the shipped scenes both laws agree, the better the shallower: of the torque, rms over rms.
