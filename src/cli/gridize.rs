@@ -11,8 +11,8 @@ use crate::{
     Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
-        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Samples, gridize, gridize_remembering,
-        predict_histories,
+        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Reversals, Samples, gridize,
+        gridize_remembering, gridize_sliding, predict_histories,
         prediction::{Prediction, held_out, predict},
     },
     input,
@@ -103,22 +103,32 @@ pub struct Source {
     left_out: usize,
     /// What tells how the object relaxes, where something does.
     past: Option<(Vec<ForceHistory>, Past)>,
-    /// Friction of the object, and the arm and its node that felt it.
-    friction: Option<(IdentifiedFriction, Chain, usize)>,
+    friction: Option<Sliding>,
+}
+
+/// What tells of the object's friction.
+enum Sliding {
+    /// Strokes of a scan: friction, and the arm and its node that felt it.
+    Node(IdentifiedFriction, Chain, usize),
+    /// A log that goes to and fro: its rows, the joint that leads, and the sides of the cells in which they are averaged.
+    Joints(Vec<ForceHistory>, usize, Vec<f64>),
 }
 
 impl Source {
     /// Gridizes the samples; the dataset says where they come from, and that it was made now. Where something tells how
     /// the object relaxes, its scene names it.
     pub fn gridize(&self, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), Failure> {
-        let (mut dataset, report) = match &self.past {
-            Some((histories, past)) => gridize_remembering(&self.samples, (histories, *past), options)?,
-            None => gridize(&self.samples, options)?,
+        let (mut dataset, report) = match (&self.past, &self.friction) {
+            (Some((histories, past)), _) => gridize_remembering(&self.samples, (histories, *past), options)?,
+            (None, Some(Sliding::Joints(histories, lead, cell))) => {
+                gridize_sliding(&self.samples.joints, &Reversals { histories, lead: *lead, cell }, options)?
+            }
+            _ => gridize(&self.samples, options)?,
         };
         dataset.scene.clone_from(&self.scene);
-        if let Some((friction, chain, node)) = &self.friction {
+        if let Some(Sliding::Node(friction, chain, node)) = &self.friction {
             add_slip(&mut dataset, chain, *node);
-            dataset.provenance.friction = Some(*friction);
+            dataset.provenance.friction = Some(friction.clone());
         }
         if !self.scene.is_empty() {
             dataset.scene += &identified(&dataset.provenance)?;
@@ -192,7 +202,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         held_out,
         against: against.transpose()?,
         relaxation: dataset.provenance.relaxation.clone(),
-        friction: dataset.provenance.friction,
+        friction: dataset.provenance.friction.clone(),
         history_misfit,
         folder: folder.map(|folder| folder.close(&figures)).transpose()?,
         figures: report::names(&figures),
@@ -260,6 +270,9 @@ fn identified(provenance: &Provenance) -> Result<String, std::fmt::Error> {
     if let Some(found) = &provenance.friction {
         text += "\n[haptics.friction]\n";
         toml_text::entry(&mut text, "coefficient", &significant(found.coefficient), "identified by haptize gridize")?;
+        if let Some(stiffness) = found.stiffness {
+            toml_text::entry(&mut text, "stiffness", &significant(stiffness), "likewise")?;
+        }
     }
     Ok(text)
 }
@@ -343,7 +356,7 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
     let chain = Chain::new(&scene.proxy);
     let friction = identify_friction(&log, &scene.scan, &chain);
     let node = scene.scan.plan.node(chain.nodes.len());
-    let friction = friction.map(|friction| (friction, chain, node));
+    let friction = friction.map(|friction| Sliding::Node(friction, chain, node));
     Ok(Source {
         samples: log.samples(),
         scene: log.header.scene,
@@ -367,6 +380,12 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let Imported { samples, branches, histories, report } = imported?;
     let left_out = report.dropped.iter().map(|dropped| dropped.rows as usize).sum();
     let names: Vec<String> = logs.iter().map(|log| log.display().to_string()).collect();
+    let (mut past, mut friction) = (None, None);
+    if mapping.torque.relaxes {
+        past = Some((histories, Past::Log));
+    } else if mapping.torque.friction {
+        friction = Some(Sliding::Joints(histories, mapping.lead(), mapping.torque.cell.clone()));
+    }
     Ok(Source {
         samples,
         scene: String::new(),
@@ -376,8 +395,8 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
         import: Some(report),
         branches: branches.map(|branches| (branches, mapping.lead())),
         left_out,
-        past: (!histories.is_empty()).then_some((histories, Past::Log)),
-        friction: None,
+        past,
+        friction,
     })
 }
 
@@ -411,8 +430,18 @@ impl Describe for IdentifiedRelaxation {
 
 impl Describe for IdentifiedFriction {
     fn describe(&self, text: &mut Text) {
-        let Self { coefficient, strokes, deviation } = self;
-        text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes to and fro"));
+        let Self { coefficient, strokes, deviation, stiffness, predicted } = self;
+        let builds_up = stiffness.map_or(String::new(), |k| format!(", builds up at {} N/m (N m/rad)", coarse(k)));
+        text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes{builds_up}"));
+        for (joint, [with, without]) in predicted.iter().enumerate() {
+            let joint = joint + 1;
+            text.row(
+                "",
+                format_args!(
+                    "joint {joint}: held-out strokes predicted to {with:.4} rms, without friction to {without:.4}"
+                ),
+            );
+        }
     }
 }
 

@@ -11,6 +11,7 @@
 //! are not negative; the times alone are searched, term by term on a logarithmic grid, then each along its logarithm. A
 //! further term is taken where it lessens the misfit enough.
 
+use super::golden::golden_section;
 use crate::contact::linear::support::dot;
 
 /// Times on the grid of the search, a decade (1): the misfit of a time that is off by a sixth of a decade leads
@@ -192,33 +193,19 @@ impl Fit {
 
     /// Moves time `term` to where the misfit is least between its neighbours on the grid.
     fn refine(&mut self, problem: &Problem<'_>, y: &[f64], term: usize, bounds: [f64; 2]) {
-        const GOLDEN: f64 = std::f64::consts::GOLDEN_RATIO - 1.0;
         let centre = self.times[term].ln();
         let reach = std::f64::consts::LN_10 / A_DECADE;
-        let [mut low, mut high] = [(centre - reach).max(bounds[0].ln()), (centre + reach).min(bounds[1].ln())];
-        let at = |x: f64, fit: &mut Self| {
-            let mut columns = fit.columns.clone();
+        let range = [(centre - reach).max(bounds[0].ln()), (centre + reach).min(bounds[1].ln())];
+        golden_section(range, HALVINGS, |x| {
+            let mut columns = self.columns.clone();
             columns[term + 1] = problem.column(Some(x.exp()));
             let (left, factors) = constrained(&columns, y);
-            if left < fit.left {
-                fit.times[term] = x.exp();
-                (fit.columns, fit.factors, fit.left) = (columns, factors, left);
+            if left < self.left {
+                self.times[term] = x.exp();
+                (self.columns, self.factors, self.left) = (columns, factors, left);
             }
             left
-        };
-        let [mut a, mut b] = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-        let [mut of_a, mut of_b] = [at(a, self), at(b, self)];
-        for _ in 0..HALVINGS {
-            if of_a < of_b {
-                (high, b, of_b) = (b, a, of_a);
-                a = high - GOLDEN * (high - low);
-                of_a = at(a, self);
-            } else {
-                (low, a, of_a) = (a, b, of_b);
-                b = low + GOLDEN * (high - low);
-                of_b = at(b, self);
-            }
-        }
+        });
     }
 
     fn shares(&self) -> impl Iterator<Item = f64> + '_ {

@@ -149,6 +149,9 @@ pub struct Torque {
     /// Whether the object relaxes: rows are kept with their times then, and `gridize` identifies how its force fades. It
     /// needs `keep = "all"`, and a log in which each segment begins untouched.
     pub relaxes: bool,
+    /// Whether the friction that tells one direction of motion from the other is the object's own, not that of the device:
+    /// `gridize` identifies it then. It needs `keep = "average"`.
+    pub friction: bool,
     /// Rows are averaged in cells of C-space with these sides, one a joint (rad or m); needed for all but `all`.
     pub cell: Vec<f64>,
 }

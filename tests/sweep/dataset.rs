@@ -70,7 +70,13 @@ fn sample() -> Dataset {
                 misfit: 0.01,
                 held_out: Some(0.02),
             }),
-            friction: Some(haptize::dataset::IdentifiedFriction { coefficient: 0.4, strokes: 6, deviation: 0.02 }),
+            friction: Some(haptize::dataset::IdentifiedFriction {
+                coefficient: 0.4,
+                strokes: 6,
+                deviation: 0.02,
+                stiffness: Some(300.0),
+                predicted: vec![[0.1, 0.4]],
+            }),
             aim: None,
         },
     }
