@@ -19,6 +19,7 @@ mod hyperspace;
 mod interpolant;
 mod line;
 mod memory;
+mod normal;
 mod order;
 mod plane;
 pub mod prediction;

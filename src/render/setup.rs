@@ -131,7 +131,9 @@ impl Setup {
     /// When the dataset's contact forces do not fit the object.
     pub fn graphics(&self, dataset: &Dataset) -> Result<Option<Graphics<'_>>, Error> {
         match (&self.object, &self.scene.graphics, self.contact_forces(dataset)?) {
-            (Some(object), Some(graphics), Some(forces)) => Ok(Some(Graphics::new(forces, object, graphics)?)),
+            (Some(object), Some(graphics), Some(forces)) => {
+                Ok(Some(Graphics::new(forces, object, graphics, self.scene.haptics.relaxation.as_ref())?))
+            }
             _ => Ok(None),
         }
     }
