@@ -27,7 +27,7 @@ use crate::{
     },
     report::FIGURES,
     scene::Scene,
-    sweep::Clearance,
+    sweep::{Clearance, thin_parts},
 };
 use serde::Serialize;
 use std::{
@@ -141,6 +141,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
     let trace = &played.trace;
+    let path = || trace.ticks.iter().map(|tick| (tick.proxy, tick.sample.contact)).collect::<Vec<_>>();
+    // Of a dataset the bake has told it.
+    let thin_part = live.as_ref().and_then(|scene| thin_parts::on_path(scene.direct().model(), &path()));
     let tally = tally(trace);
     let summary = trace.summary();
     let fault = trace.ticks.iter().find_map(|tick| Some(Fault { time: tick.time, reason: tick.fault?.to_string() }));
@@ -154,6 +157,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         replayed: told.is_some(),
         device: arguments.device.as_ref().map(|device| Driven { name: device.to_string(), tally }),
         clearance,
+        thin_part,
         felt,
         recording: arguments.record.as_ref().map(|file| Record { file: file.display().to_string(), replaced }),
         overwritten: filled.close(&files)?,
@@ -181,6 +185,9 @@ struct PlayedSession {
     device: Option<Driven>,
     /// How near arm and object come where nothing touches.
     clearance: Option<Clearance>,
+    /// What to tell of a part of the object that the arm got through, where contact was solved live.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    thin_part: Option<String>,
     #[serde(flatten)]
     felt: PlaybackReport,
     files: Vec<String>,
@@ -230,6 +237,7 @@ impl Describe for PlayedSession {
         if let Some(stiffness) = &self.border {
             text.row("border", format_args!("holds the device with the coupling's stiffness Kvc: {stiffness}"));
         }
+        self.thin_part.iter().for_each(|told| text.row("note", told));
         self.felt.describe(text);
         if let Some(Fault { time, reason }) = &self.fault {
             let remedy = "play again to clear it";
