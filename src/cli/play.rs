@@ -71,6 +71,9 @@ pub struct Arguments {
     /// Torque only while the space bar is held (a dead-man key).
     #[arg(long, requires = "device")]
     hold_key: bool,
+    /// Change the scene's gains that are not passive to the nearest that are, for this session.
+    #[arg(long)]
+    passive_gains: bool,
     /// Run against the clock, in a real-time thread where permitted, instead of as fast as possible.
     #[arg(long)]
     realtime: bool,
@@ -105,8 +108,15 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         Some(scene) => Setup::live(Arc::clone(scene), &dataset),
         None => Setup::new(&dataset),
     };
-    let setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
-    let notes = live.iter().filter_map(|scene| scene.notice()).chain(setup.advice.as_deref());
+    let mut setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
+    if arguments.passive_gains {
+        let changes = setup.make_passive(&dataset)?;
+        if !changes.is_empty() {
+            tell(format_args!("haptize: note: the gains are made passive: {}", changes.join(", ")));
+        }
+    }
+    let notes =
+        live.iter().filter_map(|scene| scene.notice()).chain(setup.advice.as_ref().map(|advice| advice.text.as_str()));
     notes.for_each(|note| tell(format_args!("haptize: note: {note}")));
     let clearance = if live.is_some() { None } else { warn_of_free_space(&dataset)? };
     let open_beside = |path| -> Result<Beside<'_>, Failure> {
