@@ -12,12 +12,14 @@
 
 mod cells;
 mod check;
+mod guess;
 mod mapping;
 mod rows;
 mod units;
 mod window;
 
 pub use cells::CellReport;
+pub use guess::{GuessedMapping, draws, guess};
 pub use mapping::{BadRows, ColumnName, Effort, Filter, Joint, Keep, Mapping, Quantity, Table, Time, Torque};
 pub use units::ColumnUnit;
 
