@@ -20,13 +20,12 @@ use super::{
 use crate::{
     Error, MAX_AXES,
     contact::{MeshRipple, Model},
-    dataset::{self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target},
+    dataset::{self, Axis, Claim, Dataset, Extras, Grid, Heading, Provenance, Surface, Target},
     error, memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
 };
 use std::{
-    collections::TryReserveError,
     ffi::OsString,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
@@ -126,9 +125,7 @@ impl<'a> Sweep<'a> {
             shape: Shape {
                 joints: grid.joints(),
                 surface_nodes: object.surface_nodes,
-                with_forces,
-                with_tangent: false,
-                with_slip: scene.haptics.uses_slip(),
+                extras: Extras { forces: with_forces, tangent: false, slip: scene.haptics.uses_slip() },
             },
             with_forces,
             grid,
@@ -189,7 +186,7 @@ impl<'a> Sweep<'a> {
     pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), Error> {
         if lowest::applies(model.contact.law) {
             self.lowest = Some(self.fitting(model)?);
-            self.shape.with_forces = true;
+            self.shape.extras.forces = true;
         }
         Ok(())
     }
@@ -237,7 +234,7 @@ impl<'a> Sweep<'a> {
         if joints != self.grid.joints() {
             return Err(in_grid(format_args!("{} axes for {joints} joints", self.grid.joints())));
         }
-        self.shape.with_tangent = model.with_tangent;
+        self.shape.extras.tangent = model.with_tangent;
         Ok(model)
     }
 
@@ -263,8 +260,7 @@ impl<'a> Sweep<'a> {
             chunk.saturating_add(if in_memory { results(touching).saturating_mul(2) } else { assembly::buffers() })
         };
         // A shard holds the forces from which lower equilibria are searched for.
-        let with_forces = self.with_forces || (self.shard != Shard::WHOLE && self.shape.with_forces);
-        let stored = Shape { with_forces, ..self.shape };
+        let stored = if self.shard == Shard::WHOLE { self.stored() } else { self.shape };
         let disk = |touching| if in_memory { 0 } else { footprint::results(points, touching, stored) };
         Footprint { memory: Bounds::of(self.proxy_nodes, memory), disk: Bounds::of(self.proxy_nodes, disk) }
     }
@@ -298,14 +294,13 @@ impl<'a> Sweep<'a> {
         let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut chunks)?;
         let blocks = chunks.iter().map(|(first, columns)| Block::of(columns, *first)).collect();
-        let mut table = Table::new(self.shape.width(), blocks);
+        let mut table = Table::new(self.shape, blocks);
         let (report, provenance) = self.complete(solved, &mut table, run.stop, None)?;
-        let shape = Shape { with_forces: self.with_forces, ..self.shape };
         // Nothing stops it halfway.
         let never = AtomicBool::new(false);
-        let results = Results::new(&table, points, shape, &never);
-        let dataset = self.dataset(&results, provenance);
-        Ok((dataset.map_err(|why| no_memory(points, bytes, why))?, report))
+        let mut results = Results::new(&table, points, self.stored(), &never);
+        let dataset = Dataset::of(&mut results, self.grid.clone()).map_err(|why| no_memory(points, bytes, why))?;
+        Ok((Dataset { surface: Some(self.surface.clone()), scene: self.scene.clone(), provenance, ..dataset }, report))
     }
 
     /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it
@@ -356,12 +351,11 @@ impl<'a> Sweep<'a> {
         };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
         let map = part.map().map_err(|source| in_part(&kept_in, &source))?;
-        let mut table = part.table(&map, self.shape.width())?;
+        let mut table = part.table(&map, self.shape)?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
         check_unclaimed(output)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
-        let shape = Shape { with_forces: self.with_forces, ..self.shape };
-        let results = Results::new(&table, report.points, shape, stop);
+        let results = Results::new(&table, report.points, self.stored(), stop);
         results.assemble(target, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         drop(map);
         part.remove()?;
@@ -376,8 +370,7 @@ impl<'a> Sweep<'a> {
             scene: self.scene.clone(),
             scene_path: self.scene_path.clone(),
             object: self.object,
-            with_tangent: self.shape.with_tangent,
-            with_slip: self.shape.with_slip,
+            shape: self.shape,
             provenance: self.provenance.clone(),
         }
     }
@@ -385,6 +378,11 @@ impl<'a> Sweep<'a> {
     /// Number of points that are solved.
     pub(super) fn points(&self) -> usize {
         self.shard.points(self.grid.points())
+    }
+
+    /// Columns of the dataset.
+    pub(super) fn stored(&self) -> Shape {
+        Shape { extras: Extras { forces: self.with_forces, ..self.shape.extras }, ..self.shape }
     }
 
     /// Finds the lowest equilibria and measures the error, as far as the sweep was asked to.
@@ -431,38 +429,6 @@ impl<'a> Sweep<'a> {
     /// Returns how free space is found, where it is.
     pub(super) fn free_space(&self) -> Option<FreeSpace<'_>> {
         self.model.map(|model| FreeSpace::new(model, &self.grid))
-    }
-
-    fn dataset(&self, results: &Results<'_>, provenance: Provenance) -> Result<Dataset, TryReserveError> {
-        let contacts = || -> Result<Contacts, TryReserveError> {
-            Ok(Contacts {
-                offsets: results.column(Stored::ContactOffsets)?.into(),
-                nodes: results.column(Stored::ContactNodes)?.into(),
-                forces: results.column(Stored::ContactForces)?.into(),
-            })
-        };
-        let slip = || -> Result<SlipColumns, TryReserveError> {
-            Ok(SlipColumns {
-                normal_force: results.column(Stored::NormalForce)?.into(),
-                jacobian: results.column(Stored::SlipJacobian)?.into(),
-            })
-        };
-        Ok(Dataset {
-            grid: self.grid.clone(),
-            torque: results.column(Stored::Torque)?.into(),
-            energy: Some(results.column(Stored::Energy)?.into()),
-            tangent: self.shape.with_tangent.then(|| results.column(Stored::Tangent)).transpose()?.map(Into::into),
-            gap: Some(results.column(Stored::Gap)?.into()),
-            status: results.column(Stored::Status)?.into(),
-            residual: Some(results.column(Stored::Residual)?.into()),
-            iterations: Some(results.column(Stored::Iterations)?.into()),
-            contacts: self.with_forces.then(contacts).transpose()?,
-            slip: self.shape.with_slip.then(slip).transpose()?,
-            surface: Some(self.surface.clone()),
-            refinement: None,
-            scene: self.scene.clone(),
-            provenance,
-        })
     }
 }
 

@@ -125,20 +125,10 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         offsets.push(nodes.len() as u64);
     }
     Dataset {
-        grid,
-        torque: torques.into(),
-        energy: None,
         gap: Some(gaps.into()),
-        status: statuses.into(),
-        residual: None,
-        iterations: None,
-        tangent: None,
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
-        slip: None,
         surface: Some(Surface::of(object)),
-        refinement: None,
-        scene: String::new(),
-        provenance: Provenance::default(),
+        ..Dataset::bare(grid, torques, statuses)
     }
 }
 

@@ -125,20 +125,13 @@ impl Dataset {
             }
         }
         Self {
-            torque: torque.into(),
             energy: Some(energy.into()),
-            tangent: None,
             gap: Some(gap.into()),
-            status: status.into(),
-            residual: None,
-            iterations: None,
-            contacts: None,
-            slip: None,
             surface,
             refinement: Some(store),
-            grid,
             scene,
             provenance,
+            ..Self::bare(grid, torque, status)
         }
     }
 }
