@@ -9,7 +9,6 @@ mod accuracy;
 mod agreement;
 mod atomic;
 mod check;
-mod claim;
 mod column;
 mod error;
 mod export;
@@ -27,8 +26,7 @@ pub use accuracy::{
     FrictionExcess, GeometryError, IdentifiedFriction, IdentifiedRelaxation, InterpolationError, MeasuredError,
 };
 pub(crate) use atomic::BUFFER;
-pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
-pub use claim::Claim;
+pub use atomic::{Replacement, discard_unfinished, replace_file, resolved};
 pub use column::Column;
 pub use export::Format;
 pub(crate) use file::{

@@ -7,13 +7,14 @@ use super::{
 };
 use crate::Error;
 use crate::dataset::{
-    self, Column, Element, Heading, RESULTS, Source, Stored, Surface, Target, Tensor, TensorContents, surface_tensors,
+    self, Column, Element, Heading, RESULTS, Source, Stored, Surface, Tensor, TensorContents, surface_tensors,
     write_file,
 };
 use rayon::prelude::*;
 use std::{
     io::{self, Write},
     ops::Range,
+    path::Path,
     sync::atomic::{AtomicBool, Ordering},
 };
 
@@ -77,7 +78,7 @@ impl<'a> Results<'a> {
     }
 
     /// Writes all points as the dataset `output`.
-    pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), Error> {
+    pub fn assemble(&self, output: &Path, heading: Heading<'_>, surface: &Surface) -> Result<(), Error> {
         let tensor =
             |array: Stored| Tensor::stored(array, heading.grid, self.bytes(array), Contents::Results(self, array));
         let stored = RESULTS.into_iter().filter(|array| self.shape.extras.store(*array));

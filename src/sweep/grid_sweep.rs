@@ -8,7 +8,7 @@ use super::{
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
     columns::{Columns, Shape},
-    error::{busy, in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
+    error::{in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
     footprint::{self, Bounds},
     lowest,
     measured::{ErrorCheck, MOST_CONFIGURATIONS},
@@ -20,7 +20,7 @@ use super::{
 use crate::{
     Error, MAX_AXES,
     contact::{MeshRipple, Model},
-    dataset::{self, Axis, Claim, Dataset, Extras, Grid, Heading, Provenance, Surface, Target},
+    dataset::{self, Axis, Dataset, Extras, Grid, Heading, Provenance, Surface},
     error, memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
@@ -268,13 +268,9 @@ impl<'a> Sweep<'a> {
     /// Returns where [`Sweep::bake`] keeps what it has of `output`.
     #[must_use]
     pub fn part_of(output: &Path) -> PathBuf {
-        with_suffix(output, ".part")
-    }
-
-    /// Name that the file `output` has while it is put together.
-    #[must_use]
-    pub fn growing_of(output: &Path) -> PathBuf {
-        with_suffix(output, ".growing")
+        let mut name = OsString::from(output);
+        name.push(".part");
+        name.into()
     }
 
     /// Sweeps in memory.
@@ -303,8 +299,8 @@ impl<'a> Sweep<'a> {
         Ok((Dataset { surface: Some(self.surface.clone()), scene: self.scene.clone(), provenance, ..dataset }, report))
     }
 
-    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it
-    /// is put together its name ends in `.growing`. Memory does not grow with the grid.
+    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. Memory does
+    /// not grow with the grid.
     ///
     /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the
     /// interruption, the date of the beginning included. Without a part it begins. Without `resume` a part that holds
@@ -325,7 +321,6 @@ impl<'a> Sweep<'a> {
         // The part grows beside the file that a link leads to: only there can that be replaced.
         let output = &dataset::resolved(output).map_err(|source| unwritable(output, &source))?;
         dataset::check_place(output)?;
-        check_unclaimed(output)?;
         let mut binding = self.binding();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;
@@ -337,9 +332,6 @@ impl<'a> Sweep<'a> {
         }
         let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance };
-        // Nobody else writes there: the part is locked.
-        let growing = Self::growing_of(output);
-        let target = Target::growing(output, &growing);
         let stop = run.stop;
         let kept_in = part.path().to_path_buf();
         let unwritten = |why: Error, points| {
@@ -353,10 +345,9 @@ impl<'a> Sweep<'a> {
         let map = part.map().map_err(|source| in_part(&kept_in, &source))?;
         let mut table = part.table(&map, self.shape)?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
-        check_unclaimed(output)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
         let results = Results::new(&table, report.points, self.stored(), stop);
-        results.assemble(target, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
+        results.assemble(output, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         drop(map);
         part.remove()?;
         Ok(report)
@@ -447,12 +438,6 @@ pub(super) fn check_axes(scene: &Scene) -> Result<(), Error> {
     if joints > MAX_AXES { Err(too_many_joints(joints)) } else { Ok(()) }
 }
 
-/// Checks that no other process writes the file `output`: it would be lost, or the dataset written over.
-fn check_unclaimed(output: &Path) -> Result<(), Error> {
-    // Where nobody can claim it nobody can write it either, which is told by who tries.
-    if matches!(Claim::new(output), Ok(None)) { Err(busy(output)) } else { Ok(()) }
-}
-
 /// CRC-32 of all that contact knows of `object`.
 fn content(object: &Object) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
@@ -461,10 +446,4 @@ fn content(object: &Object) -> u32 {
     hasher.update(bytemuck::cast_slice(&object.stiffness.columns));
     object.stiffness.blocks.iter().for_each(|block| hasher.update(bytemuck::cast_slice(&block.to_cols_array())));
     hasher.finalize()
-}
-
-fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
-    let mut name = OsString::from(path);
-    name.push(suffix);
-    name.into()
 }
