@@ -165,6 +165,31 @@ fn an_stl_file_is_read_whole_however_its_program_writes_it() {
     }
 }
 
+#[test]
+fn remarks_of_any_encoding_do_not_keep_a_mesh_from_being_read() {
+    let text = std::fs::read_to_string(dataset("cube.ply")).unwrap();
+    let remark = [b"\ncomment W\xfcrfel".as_slice(), &[b'9'; 30], b"\n"].concat();
+    let (ply, rest) = text.split_at(text.find('\n').unwrap());
+    let [_, (_, binary)] = binary_cubes();
+    for content in [
+        format!("\u{feff}{text}").into_bytes(),
+        [ply.as_bytes(), &remark, &rest.as_bytes()[1..]].concat(),
+        [b"ply", &remark[..], &binary[4..]].concat(),
+        text.replace('\n', "\r\n").into_bytes(),
+    ] {
+        let object = build_from("ply", &content).unwrap();
+        assert_eq!((object.rest.len(), object.triangles.len()), (8, 12));
+    }
+    let returns = build_from("ply", text.replace('\n', "\r").as_bytes()).unwrap_err().to_string();
+    assert!(returns.contains("carriage returns alone: export the mesh again"), "{returns}");
+    for extension in ["ply", "stl", "obj"] {
+        for mark in [b"\xff\xfe", b"\xfe\xff"] {
+            let wide = build_from(extension, &[&mark[..], b"p\0l\0y\0"].concat()).unwrap_err().to_string();
+            assert!(wide.contains("it is text in UTF-16, not UTF-8: convert it by"), "{extension}: {wide}");
+        }
+    }
+}
+
 /// A prism of height 1 on a polygon in the plane, its two ends as one face each, which begin with corner `first`.
 fn prism(outline: &[[f64; 2]], first: usize) -> (Vec<DVec3>, Vec<Vec<usize>>) {
     let count = outline.len();
