@@ -78,7 +78,7 @@ pub struct Sweep<'a> {
     /// Whether the dataset holds contact forces.
     pub(super) with_forces: bool,
     /// The object's skin.
-    skin: Option<Skin>,
+    pub(super) skin: Option<Skin>,
     /// Warnings about the object.
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
@@ -413,8 +413,7 @@ impl<'a> Sweep<'a> {
 
     pub(super) fn report(&self, solved: Solved) -> (SweepReport, Provenance) {
         let Solved { tally, facts, provenance } = solved;
-        let report = SweepReport::of(&tally, facts, &provenance, &self.warnings);
-        (SweepReport { skin: self.skin, forecast: self.forecast, ..report }, provenance)
+        (SweepReport::of(self, &tally, facts, &provenance), provenance)
     }
 
     /// Returns how free space is found, where it is.
