@@ -218,7 +218,7 @@ impl<'a> Sweep<'a> {
     pub(crate) fn solved_by(&mut self, backend: &ChosenBackend<'_>) {
         self.provenance.backend = backend.name().into();
         self.provenance.adapter = backend.adapter();
-        if let (Some(forecast), ChosenBackend::Gpu { .. }) = (&mut self.forecast, backend) {
+        if let (Some(forecast), false) = (&mut self.forecast, backend.is_cpu_alone()) {
             forecast.seconds = None;
         }
     }
