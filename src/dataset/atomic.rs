@@ -79,10 +79,7 @@ pub fn resolved(path: &Path) -> io::Result<PathBuf> {
 ///
 /// # Errors
 /// Returns the error of `write` or of the system; then the old file is untouched and the temporary one is gone.
-pub fn replace_file(
-    path: impl AsRef<Path>,
-    write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
-) -> io::Result<()> {
+pub fn replace_file(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
     let replacement = Replacement::begin(path)?;
     let mut writer = replacement.writer();
     write(&mut writer)?;
@@ -104,8 +101,8 @@ impl Replacement {
     /// # Errors
     /// Those of the system, here and below; and where the file is there and may not be written to, though the system
     /// lets it be replaced.
-    pub fn begin(path: impl AsRef<Path>) -> io::Result<Self> {
-        let path = resolved(path.as_ref())?;
+    pub fn begin(path: &Path) -> io::Result<Self> {
+        let path = resolved(path)?;
         if fs::metadata(&path).is_ok_and(|there| there.permissions().readonly()) {
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is there and may not be written to"));
         }

@@ -199,8 +199,7 @@ impl Dataset {
     ///
     /// # Errors
     /// When it would be refused on reading, a file of another kind is there, or the system refuses.
-    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let path = path.as_ref();
+    pub fn save(&self, path: &Path) -> Result<(), Error> {
         check_place(path)?;
         check::check(self).map_err(|reason| inconsistent(path, reason))?;
         let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };

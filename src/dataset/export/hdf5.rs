@@ -43,7 +43,7 @@ fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {
         let shape: Vec<u64> = tensor.shape.iter().map(|&count| count as u64).collect();
         let mut described = DatasetBuilder::new(tensor.name, datatype(tensor.dtype)?, shape)
             .raw_data(tensor.contents)
-            .attribute(AttributeBuilder::fixed_string("units", &array.unit(grid)))
+            .attribute(AttributeBuilder::fixed_string("units", array.unit(grid)))
             .attribute(AttributeBuilder::vlen_strings("DIMENSION_LABELS", &axes)?);
         if of_grid > 0 {
             over_grid.push(tensor.name);

@@ -84,9 +84,8 @@ impl Store {
         surface: Option<&Surface>,
         scene: &str,
         provenance: &Provenance,
-        path: impl AsRef<Path>,
+        path: &Path,
     ) -> Result<(), Error> {
-        let path = path.as_ref();
         check_place(path)?;
         save(self, Heading { grid, provenance, scene }, surface, path)
     }
