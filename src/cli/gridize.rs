@@ -284,7 +284,7 @@ fn identified(provenance: &Provenance) -> Result<String, std::fmt::Error> {
 fn at_rest(dataset: &Dataset) -> Dataset {
     let fading = |relaxation: &IdentifiedRelaxation| relaxation.terms.iter().map(|[share, _]| share).sum::<f64>();
     let lasting = 1.0 - dataset.provenance.relaxation.as_ref().map_or(0.0, fading);
-    let torque = dataset.torque.iter().map(|torque| lasting * torque).collect();
+    let torque: Vec<f64> = dataset.torque.iter().map(|torque| lasting * torque).collect();
     Dataset::bare(dataset.grid.clone(), torque, dataset.status.to_vec())
 }
 

@@ -2,11 +2,7 @@
 //! dataset without code. `datasets/instrument.toml` is an example with every key explained.
 
 use super::units::ColumnUnit;
-use crate::{
-    Error,
-    dataset::JointLabel,
-    scene::{self, Diagnostic},
-};
+use crate::{Error, dataset::JointLabel, scene};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -243,7 +239,7 @@ impl Mapping {
     /// # Errors
     /// The error names the file, the line and the key.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
-        let invalid = |place, message: &str| Error::new(Diagnostic::new(path, text, place, message).to_string());
+        let invalid = |place, message: &str| Error::in_text(path, text, place, message);
         let mut mapping: Self =
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
         for joint in mapping.joints.iter_mut().filter(|joint| joint.unit.is_empty()) {

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use haptize::{
     JointVector,
     contact::Status,
-    dataset::{Axis, Contacts, Dataset, Grid, JointLabel, Provenance, Surface},
+    dataset::{Axis, Contacts, Dataset, Grid, JointLabel, Surface},
     device::Applied,
     draw::canvas::{Anchor, Canvas, TextStyle, Weight},
     field::Sample,
@@ -125,20 +125,10 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
         offsets.push(nodes.len() as u64);
     }
     Dataset {
-        grid,
-        torque: torques.into(),
-        energy: None,
         gap: Some(gaps.into()),
-        status: statuses.into(),
-        residual: None,
-        iterations: None,
-        tangent: None,
         contacts: Some(Contacts { offsets: offsets.into(), nodes: nodes.into(), forces: forces.into() }),
-        slip: None,
         surface: Some(Surface::of(object)),
-        refinement: None,
-        scene: String::new(),
-        provenance: Provenance::default(),
+        ..Dataset::bare(grid, torques, statuses)
     }
 }
 
@@ -540,7 +530,7 @@ fn parts_that_do_not_belong_together_are_refused() {
 
     let file = folder("refused").join("cspace.png");
     let error = report::write_figures(&file, &dataset, None).unwrap_err().to_string();
-    assert!(error.contains("cannot write") && error.contains("cspace.png"), "{error}");
+    assert!(error.contains("cannot be written") && error.contains("cspace.png"), "{error}");
 }
 
 #[test]
