@@ -93,8 +93,8 @@ where
     if live.is_none() {
         let shown = dataset.clone();
         figures.push(Figure::picture("cspace", move || Ok(space::space(&shown))));
-        let shown = dataset.clone();
-        figures.push(Figure::drawing("torque", move || slices::slices(&shown)));
+        let (shown, deepest) = (dataset.clone(), recording.and_then(|(_, trace)| press::deepest(trace)));
+        figures.push(Figure::drawing("torque", move || slices::slices(&shown, deepest.as_deref())));
     }
     let Some((chain, trace)) = recording else { return figures };
     let shown = trace.clone();
