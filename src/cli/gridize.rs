@@ -3,6 +3,7 @@
 use super::{
     Failure,
     bar::Bar,
+    guessed,
     output::{self, Content, Folder, Overwritten, Replaced},
     report::{self, Describe, Report, Text},
     tell, watch,
@@ -16,7 +17,7 @@ use crate::{
         prediction::{Prediction, held_out, predict},
     },
     input,
-    logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
+    logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, draws, import, total_size},
     proxy::Chain,
     report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
@@ -37,6 +38,7 @@ Examples:
   haptize gridize sponge.csv --step 0.03
   haptize gridize sponge.csv --step 0.03 --held-out 0.1 --figures out
   haptize gridize log.mcap --topic /joint_states --step 0.03
+  haptize gridize --guess run1.csv                  writes run1.columns.toml: what each column seems to be
   haptize gridize run1.csv run2.csv --columns instrument.toml --step 0.02,0.02,0.01 --scene arm.toml")]
 pub struct Arguments {
     /// A log written by `haptize scan`, an MCAP file with joint states of a robot, or with --columns any tables of
@@ -44,7 +46,14 @@ pub struct Arguments {
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     /// Grid step (rad or m): one number, or one a joint, separated by commas.
-    #[arg(long, required = true, value_delimiter = ',', num_args = 1, value_name = "H", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        required_unless_present = "guess",
+        value_delimiter = ',',
+        num_args = 1,
+        value_name = "H",
+        allow_negative_numbers = true
+    )]
     step: Vec<f64>,
     /// The dataset to write; by default the first log's name in the current folder, ending in .haptize.
     #[arg(short, long)]
@@ -52,6 +61,10 @@ pub struct Arguments {
     /// A TOML file that maps columns to quantities (datasets/instrument.toml is an example).
     #[arg(long, value_name = "TOML")]
     columns: Option<PathBuf>,
+    /// Write a column mapping for the log, guessed from the names of its columns and their numbers, instead of a
+    /// dataset; -o names it.
+    #[arg(long, conflicts_with_all = ["columns", "topic", "scene", "held_out", "against", "figures"])]
+    guess: bool,
     /// The topic of joint states to read of an MCAP file; by default its only one.
     #[arg(long)]
     topic: Option<String>,
@@ -143,6 +156,9 @@ impl Source {
 
 /// Reads the logs and writes the dataset.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    if arguments.guess {
+        return guessed::run(&arguments.logs, arguments.output.as_deref());
+    }
     let started = Instant::now();
     let output = output(arguments)?;
     let inputs = arguments.logs.iter().chain(&arguments.against).chain(&arguments.columns).chain(&arguments.scene);
@@ -281,7 +297,7 @@ fn identified(provenance: &Provenance) -> Result<String, std::fmt::Error> {
 fn at_rest(dataset: &Dataset) -> Dataset {
     let fading = |relaxation: &IdentifiedRelaxation| relaxation.terms.iter().map(|[share, _]| share).sum::<f64>();
     let lasting = 1.0 - dataset.provenance.relaxation.as_ref().map_or(0.0, fading);
-    let torque = dataset.torque.iter().map(|torque| lasting * torque).collect();
+    let torque: Vec<f64> = dataset.torque.iter().map(|torque| lasting * torque).collect();
     Dataset::bare(dataset.grid.clone(), torque, dataset.status.to_vec())
 }
 
@@ -378,6 +394,12 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let imported = import(mapping, logs, &mut progress);
     bar.finish();
     let Imported { samples, branches, histories, report } = imported?;
+    if draws(&samples) {
+        tell(format_args!(
+            "haptize: note: the torques draw the arm on where an object pushes it back: if they are the motors', say \
+             effort = \"motor\" in [torque] of the mapping, or --effort; if they hold the weight of the arm, take it off"
+        ));
+    }
     let left_out = report.dropped.iter().map(|dropped| dropped.rows as usize).sum();
     let names: Vec<String> = logs.iter().map(|log| log.display().to_string()).collect();
     let (mut past, mut friction) = (None, None);

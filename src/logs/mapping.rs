@@ -2,11 +2,7 @@
 //! dataset without code. `datasets/instrument.toml` is an example with every key explained.
 
 use super::units::ColumnUnit;
-use crate::{
-    Error,
-    dataset::JointLabel,
-    scene::{self, Diagnostic},
-};
+use crate::{Error, dataset::JointLabel, scene};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -32,7 +28,7 @@ pub struct Mapping {
 
 /// Layout of the text.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table, as in `[table]`")]
 pub struct Table {
     /// One character between columns; a blank takes any run of blanks and tabs.
     pub delimiter: char,
@@ -64,7 +60,7 @@ pub enum BadRows {
 
 /// Where time comes from: a column, or a constant period between rows.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, as in `[time]`")]
 pub struct Time {
     /// The column of time stamps.
     pub column: Option<ColumnName>,
@@ -82,7 +78,7 @@ pub struct Time {
 
 /// A column by its number, from 1, or by its name in the header.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "the name of a column or its number")]
 pub enum ColumnName {
     /// From 1.
     Number(usize),
@@ -92,7 +88,7 @@ pub enum ColumnName {
 
 /// One joint.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, as in `[[joint]]`")]
 pub struct Joint {
     /// Its name in the dataset.
     pub name: String,
@@ -107,7 +103,7 @@ pub struct Joint {
 
 /// `scale * unit * column + offset`, in SI units.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, as in `{ column = \"NAME\" }`")]
 pub struct Quantity {
     /// Where it stands.
     pub column: ColumnName,
@@ -123,7 +119,7 @@ pub struct Quantity {
 
 /// Row by row.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table, as in `[filter]`")]
 pub struct Filter {
     /// Speed is the difference over this many rows to either side.
     pub speed_rows: usize,
@@ -136,7 +132,7 @@ pub struct Filter {
 
 /// Which torque is kept.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table, as in `[torque]`")]
 pub struct Torque {
     /// What was measured.
     pub effort: Effort,
@@ -246,7 +242,7 @@ impl Mapping {
     /// # Errors
     /// The error names the file, the line and the key.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
-        let invalid = |place, message: &str| Error::new(Diagnostic::new(path, text, place, message).to_string());
+        let invalid = |place, message: &str| Error::in_text(path, text, place, message);
         let mut mapping: Self =
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
         for joint in mapping.joints.iter_mut().filter(|joint| joint.unit.is_empty()) {

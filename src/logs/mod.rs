@@ -11,11 +11,13 @@
 //! A log may also be an MCAP file of a robot: its joint states are read as a table ([`crate::ros`]).
 
 mod check;
+mod guess;
 mod mapping;
 mod rows;
 mod units;
 mod window;
 
+pub use guess::{GuessedMapping, draws, guess};
 pub use mapping::{BadRows, ColumnName, Effort, Filter, Joint, Keep, Mapping, Quantity, Table, Time, Torque};
 pub use units::ColumnUnit;
 

@@ -84,17 +84,8 @@ fn sample() -> Dataset {
 
 /// The least that a dataset can be: what a scanned object has.
 fn bare() -> Dataset {
-    Dataset {
-        energy: None,
-        tangent: None,
-        gap: None,
-        residual: None,
-        iterations: None,
-        contacts: None,
-        slip: None,
-        surface: None,
-        ..sample()
-    }
+    let Dataset { grid, torque, status, scene, provenance, .. } = sample();
+    Dataset { scene, provenance, ..Dataset::bare(grid, torque, status) }
 }
 
 fn bits<T: bytemuck::Pod>(column: &[T]) -> Vec<u8> {
