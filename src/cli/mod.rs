@@ -54,6 +54,7 @@ mod reach;
 mod refine;
 mod report;
 mod scan;
+mod shape;
 mod shard;
 mod shell;
 mod view;
@@ -137,6 +138,8 @@ enum Command {
     Reach(reach::Arguments),
     /// Measure a real object by touching it with a rig (the rig that ships is simulated).
     Scan(scan::Arguments),
+    /// Find the surface of a scanned object from the log of its scan.
+    Shape(shape::Arguments),
     /// Open a dataset or a scene in a window.
     View(view::Arguments),
 }
@@ -163,6 +166,7 @@ impl Command {
             Self::Play(arguments) => play::run(arguments),
             Self::Reach(arguments) => reach::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
+            Self::Shape(arguments) => shape::run(arguments),
             Self::View(arguments) => view::run(arguments),
         }
     }
