@@ -11,8 +11,11 @@ use std::{
 /// that no account or torque of the haptic loop can become infinite.
 pub(crate) const GREATEST_INPUT: f64 = 1e9;
 
+/// What to do with a text in two bytes a character.
+const UTF_16: &str = "it is text in UTF-16, not UTF-8: convert it by `iconv -f UTF-16 -t UTF-8 FILE`";
+
 /// How files begin that are never what is asked for, and what to do with each.
-const FOREIGN: [(&[u8], &str); 5] = [
+const FOREIGN: [(&[u8], &str); 7] = [
     (
         b"version https://git-lfs.github.com/spec/",
         "this is a pointer of Git LFS, not the file itself: run `git lfs pull` in its repository",
@@ -23,6 +26,8 @@ const FOREIGN: [(&[u8], &str); 5] = [
         b"SQLite format 3\0",
         "it is a database of SQLite, as ROS 2 records in .db3 files: write it as MCAP by `ros2 bag convert`",
     ),
+    (b"\xff\xfe", UTF_16),
+    (b"\xfe\xff", UTF_16),
     (b"#ROSBAG V2.0", "it is a bag of ROS 1: write it as MCAP by `rosbags-convert --src FILE.bag --dst FOLDER`"),
 ];
 

@@ -1,4 +1,4 @@
-//! `haptize info`: what a dataset holds. The whole file is checked first.
+//! `haptize info`: what a dataset or a mesh holds. The whole file is checked first.
 
 use super::{
     Failure,
@@ -8,8 +8,9 @@ use super::{
 use crate::{
     dataset::{Axis, Dataset, Provenance, Refinement, StatusCounts, Summary},
     names::escaped,
-    object::Skin,
+    object::{MeshSummary, Skin},
     scene::{Material, ObjectSpec, Rendering, SkinSpec},
+    toml_text::{number, vector},
 };
 use glam::DVec3;
 use serde::Serialize;
@@ -20,10 +21,12 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   haptize info sphere.haptize
-  haptize info sphere.haptize --json")]
+  haptize info sphere.haptize --json
+  haptize info organ.obj")]
 pub struct Arguments {
-    /// The dataset's file.
-    dataset: PathBuf,
+    /// A dataset, or the file of a mesh: OBJ, STL, PLY or MSH.
+    #[arg(value_name = "FILE")]
+    path: PathBuf,
 }
 
 /// What a dataset holds.
@@ -43,7 +46,11 @@ struct Info {
 
 /// Opens and checks the file, and sums it up.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
-    let path = &arguments.dataset;
+    let path = &arguments.path;
+    if MeshSummary::is_mesh(path) {
+        let mesh = MeshInfo { file: path.display().to_string(), mesh: MeshSummary::read(path)? };
+        return Report::of(&mesh, mesh.mesh.defect.is_none());
+    }
     let dataset = Dataset::open(path)?;
     let spec = Rendering::parse(&dataset.scene, "scene").ok().and_then(|scene| scene.object);
     let info = Info {
@@ -58,6 +65,42 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         }),
     };
     Report::of(&info, info.contradiction.is_none())
+}
+
+/// What a mesh file holds.
+#[derive(Serialize)]
+struct MeshInfo {
+    file: String,
+    #[serde(flatten)]
+    mesh: MeshSummary,
+}
+
+impl Describe for MeshInfo {
+    fn describe(&self, text: &mut Text) {
+        let Self { file, mesh } = self;
+        let state = if mesh.defect.is_some() { "no closed surface" } else { "a closed surface" };
+        text.line(format_args!("{file}: {} triangles, {state}", mesh.triangles));
+        text.row("nodes", format_args!("{} on the surface, {} in all", mesh.surface_nodes, mesh.nodes));
+        if mesh.tetrahedra > 0 {
+            text.row("tetrahedra", mesh.tetrahedra);
+        }
+        if mesh.parts > 1 {
+            text.row("parts", format_args!("{} surfaces that are not connected", mesh.parts));
+        }
+        let [low, high] = [mesh.low, mesh.high].map(|corner| vector(corner, 4));
+        text.row("size", format_args!("{}, from {low} to {high}", vector(mesh.high - mesh.low, 4)));
+        text.row("edges", format_args!("{:.4} long on average", mesh.mean_edge));
+        let metres = mesh.unit.metres();
+        let litres = 1e3 * mesh.volume * metres.powi(3);
+        let longest = 1e3 * metres * (mesh.high - mesh.low).max_element();
+        let (scale, unit) = (number(metres, 4), mesh.unit.name());
+        text.row(
+            "unit",
+            format_args!("{unit}, by its size: {longest:.1} mm long and {litres:.4} l with scale = {scale}"),
+        );
+        mesh.warnings.iter().for_each(|warning| text.row("notice", escaped(warning)));
+        mesh.defect.iter().for_each(|defect| text.row("defect", escaped(defect)));
+    }
 }
 
 /// What an object consists of, beside its surface and material.

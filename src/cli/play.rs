@@ -27,7 +27,7 @@ use crate::{
     },
     report::FIGURES,
     scene::Scene,
-    sweep::Clearance,
+    sweep::{Clearance, thin_parts},
 };
 use serde::Serialize;
 use std::{
@@ -71,6 +71,9 @@ pub struct Arguments {
     /// Torque only while the space bar is held (a dead-man key).
     #[arg(long, requires = "device")]
     hold_key: bool,
+    /// Change the scene's gains that are not passive to the nearest that are, for this session.
+    #[arg(long)]
+    passive_gains: bool,
     /// Run against the clock, in a real-time thread where permitted, instead of as fast as possible.
     #[arg(long)]
     realtime: bool,
@@ -105,8 +108,15 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         Some(scene) => Setup::live(Arc::clone(scene), &dataset),
         None => Setup::new(&dataset),
     };
-    let setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
-    let notes = live.iter().filter_map(|scene| scene.notice()).chain(setup.advice.as_deref());
+    let mut setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
+    if arguments.passive_gains {
+        let changes = setup.make_passive(&dataset)?;
+        if !changes.is_empty() {
+            tell(format_args!("haptize: note: the gains are made passive: {}", changes.join(", ")));
+        }
+    }
+    let notes =
+        live.iter().filter_map(|scene| scene.notice()).chain(setup.advice.as_ref().map(|advice| advice.text.as_str()));
     notes.for_each(|note| tell(format_args!("haptize: note: {note}")));
     let clearance = if live.is_some() { None } else { warn_of_free_space(&dataset)? };
     let open_beside = |path| -> Result<Beside<'_>, Failure> {
@@ -141,6 +151,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
     let trace = &played.trace;
+    let path = || trace.ticks.iter().map(|tick| (tick.proxy, tick.sample.contact)).collect::<Vec<_>>();
+    // Of a dataset the bake has told it.
+    let thin_part = live.as_ref().and_then(|scene| thin_parts::on_path(scene.direct().model(), &path()));
     let tally = tally(trace);
     let summary = trace.summary();
     let fault = trace.ticks.iter().find_map(|tick| Some(Fault { time: tick.time, reason: tick.fault?.to_string() }));
@@ -154,6 +167,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         replayed: told.is_some(),
         device: arguments.device.as_ref().map(|device| Driven { name: device.to_string(), tally }),
         clearance,
+        thin_part,
         felt,
         recording: arguments.record.as_ref().map(|file| Record { file: file.display().to_string(), replaced }),
         overwritten: filled.close(&files)?,
@@ -181,6 +195,9 @@ struct PlayedSession {
     device: Option<Driven>,
     /// How near arm and object come where nothing touches.
     clearance: Option<Clearance>,
+    /// What to tell of a part of the object that the arm got through, where contact was solved live.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    thin_part: Option<String>,
     #[serde(flatten)]
     felt: PlaybackReport,
     files: Vec<String>,
@@ -230,6 +247,7 @@ impl Describe for PlayedSession {
         if let Some(stiffness) = &self.border {
             text.row("border", format_args!("holds the device with the coupling's stiffness Kvc: {stiffness}"));
         }
+        self.thin_part.iter().for_each(|told| text.row("note", told));
         self.felt.describe(text);
         if let Some(Fault { time, reason }) = &self.fault {
             let remedy = "play again to clear it";

@@ -97,7 +97,8 @@ impl InterpolationError {
     #[must_use]
     pub fn of(interpolation: &str, mut errors: Vec<f64>) -> Self {
         errors.sort_unstable_by(f64::total_cmp);
-        let squares: f64 = errors.iter().map(|error| error * error).sum();
+        // The sum of nothing is -0 otherwise.
+        let squares = errors.iter().fold(0.0, |sum, error| sum + error * error);
         Self {
             interpolation: interpolation.to_owned(),
             median: errors.get(errors.len() / 2).copied().unwrap_or(0.0),

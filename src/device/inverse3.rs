@@ -292,7 +292,17 @@ impl Hardware for Inverse3 {
 
     fn enable(&mut self) -> Result<(), Halt> {
         self.enabled = true;
-        Ok(())
+        // The position is a new one, however long ago the connection was opened.
+        let begun = Instant::now();
+        loop {
+            let seen = *self.seen.read();
+            match seen.ended {
+                Some(halt) => return Err(halt),
+                None if seen.at > begun => return Ok(()),
+                None if begun.elapsed() > PATIENCE => return Err(Halt::Stale),
+                None => thread::sleep(PERIOD),
+            }
+        }
     }
 
     fn read(&mut self, _: f64) -> Result<Measurement, Halt> {

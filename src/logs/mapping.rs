@@ -32,7 +32,7 @@ pub struct Mapping {
 
 /// Layout of the text.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table, as in `[table]`")]
 pub struct Table {
     /// One character between columns; a blank takes any run of blanks and tabs.
     pub delimiter: char,
@@ -64,7 +64,7 @@ pub enum BadRows {
 
 /// Where time comes from: a column, or a constant period between rows.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, as in `[time]`")]
 pub struct Time {
     /// The column of time stamps.
     pub column: Option<ColumnName>,
@@ -82,7 +82,7 @@ pub struct Time {
 
 /// A column by its number, from 1, or by its name in the header.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "the name of a column or its number")]
 pub enum ColumnName {
     /// From 1.
     Number(usize),
@@ -92,7 +92,7 @@ pub enum ColumnName {
 
 /// One joint.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, as in `[[joint]]`")]
 pub struct Joint {
     /// Its name in the dataset.
     pub name: String,
@@ -107,7 +107,7 @@ pub struct Joint {
 
 /// `scale * unit * column + offset`, in SI units.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table, as in `{ column = \"NAME\" }`")]
 pub struct Quantity {
     /// Where it stands.
     pub column: ColumnName,
@@ -123,7 +123,7 @@ pub struct Quantity {
 
 /// Row by row.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table, as in `[filter]`")]
 pub struct Filter {
     /// Speed is the difference over this many rows to either side.
     pub speed_rows: usize,
@@ -136,7 +136,7 @@ pub struct Filter {
 
 /// Which torque is kept.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields, default, expecting = "a table, as in `[torque]`")]
 pub struct Torque {
     /// What was measured.
     pub effort: Effort,

@@ -1,6 +1,10 @@
 //! A body from a mesh file as the table of a scene, for a start: an elastic solid under a skin, lying on the ground.
 
-use super::{import, topology};
+use super::{
+    import,
+    mesh_summary::{enclosed, suggested},
+    topology,
+};
 use crate::Error;
 use crate::scene::Placement;
 use crate::toml_text::{coarse, entry, number, vector};
@@ -25,9 +29,6 @@ const POISSON: f64 = 0.45;
 /// Height up to which a body is held, over its own (1): the part on which it lies.
 const HELD: f64 = 0.1;
 
-/// Longest body that is taken to be given in metres where no unit is named (m).
-const LONGEST: f64 = 2.0;
-
 /// Unit of length of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -43,6 +44,17 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::M => "metres",
+            Self::Cm => "centimetres",
+            Self::Mm => "millimetres",
+            Self::In => "inches",
+        }
+    }
+
     /// (m)
     #[must_use]
     pub fn metres(self) -> f64 {
@@ -72,16 +84,12 @@ impl Draft {
     /// When the file cannot be read.
     pub fn new(file: &Path, name: &str, unit: Option<LengthUnit>, turn: DVec3, young: f64) -> Result<Self, Error> {
         let (nodes, triangles) = import::read(file, &Placement::METRES, &mut Vec::new())?;
-        let unit = unit.unwrap_or(if import::length(&nodes) > LONGEST { LengthUnit::Mm } else { LengthUnit::M });
+        let [low, high] = import::corners(&nodes);
+        let unit = unit.unwrap_or_else(|| suggested(high - low));
         let scale = unit.metres();
         let nodes = Placement { scale, turn, centre: DVec3::ZERO }.place(nodes);
         let [low, high] = import::corners(&nodes);
-        let corner = |node: u32| nodes.get(node as usize).copied().unwrap_or_default();
-        let volumes = triangles.iter().map(|triangle| {
-            let [a, b, c] = triangle.map(corner);
-            a.dot(b.cross(c)) / 6.0
-        });
-        let volume = volumes.sum::<f64>().abs();
+        let volume = enclosed(&nodes, &triangles);
         let mass = DENSITY * volume / nodes.len().max(1) as f64;
         let width = SKIN_WIDTH * topology::mean_edge(&nodes, &triangles);
         let facts = BodyFacts {

@@ -120,10 +120,20 @@ fn relative_stiffness(spec: &HapticsSpec, source: &TorqueSource) -> [f64; 2] {
 /// Keeps a bound that is met exactly from being exceeded by rounding (1).
 const ROUNDING: f64 = 1e-12;
 
-/// Returns what is wrong with the gains of `spec` in one sentence, and the values that would be passive in another;
-/// `None` where all bounds hold.
+/// What is wrong with gains that are not passive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Advice {
+    /// That in one sentence, and the values that would be passive in another.
+    pub text: String,
+    /// The gains, changed to passive ones; absent where no stiffness of the coupling is passive.
+    pub passive: Option<HapticsSpec>,
+    /// What was changed, as a scene has it.
+    pub changes: Vec<String>,
+}
+
+/// Returns what is wrong with the gains of `spec`; `None` where all bounds hold.
 #[must_use]
-pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Option<String> {
+pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Option<Advice> {
     let exceeded = || bounds.iter().filter(|bound| bound.is_exceeded());
     let worst = exceeded().max_by(|a, b| (a.value / a.safe).total_cmp(&(b.value / b.safe)))?;
     let others = match exceeded().count() - 1 {
@@ -132,13 +142,10 @@ pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Op
         count => format!(", and {count} gains more"),
     };
     let joints = source.joints();
-    let passive = damped(spec, source);
-    let mut remedies = Vec::new();
-    if passive.proxy_damping != spec.proxy_damping {
-        let damping = passive.proxy_damping.iter().zip(spec.proxy_damping.iter());
-        let damping = damping.map(|(safe, own)| if safe > own { at_least(*safe) } else { *own });
-        remedies.push(format!("proxy_damping = {}", list(damping)));
-    }
+    let passive = passive(spec, source);
+    let [damping, coupling @ ..] = changes(spec, &passive);
+    let changes = [&damping].into_iter().chain(&coupling).flatten().cloned().collect();
+    let mut remedies = Vec::from_iter(damping);
     let stiffness = |joint| spec.coupling_stiffness[joint] + handed_stiffness(spec, joint);
     // Damping helps where no encoder's step stands in the way.
     let mut alternatives = Vec::new();
@@ -151,29 +158,66 @@ pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Op
         });
         alternatives.push(format!("device_damping = {} if the device has that much", list(damping)));
     }
-    let greatest = |joint| greatest_stiffness(spec, joint);
-    if (0..joints).any(|joint| spec.coupling_stiffness[joint] > greatest(joint)) {
-        let least = (0..joints).map(|joint| {
-            let own = spec.coupling_stiffness[joint];
-            if own > greatest(joint) { at_most(greatest(joint)) } else { own }
-        });
-        if (0..joints).all(|joint| greatest(joint) > 0.0) {
-            alternatives.push(format!("coupling_stiffness = {}", list(least)));
-        } else if alternatives.is_empty() {
-            alternatives.push("less coupling_damping, or more device_damping: no coupling_stiffness is passive".into());
-        }
+    if has_coupling(&passive) {
+        let coupling: Vec<String> = coupling.into_iter().flatten().collect();
+        alternatives.extend((!coupling.is_empty()).then(|| coupling.join(" and ")));
+    } else if alternatives.is_empty() {
+        alternatives.push("more device_damping, or less boundary_slope: no coupling_stiffness is passive".into());
     }
     if !alternatives.is_empty() {
         remedies.push(alternatives.join("; or else "));
     }
-    Some(format!(
+    let text = format!(
         "the gains are not passive, so the loop may create energy: {} is {:.4}, at most {:.4} is safe{others}. Set in \
          [haptics]: {}",
         worst.what,
         worst.value,
         worst.safe,
         remedies.join("; ")
-    ))
+    );
+    Some(Advice { text, passive: has_coupling(&passive).then_some(passive), changes })
+}
+
+/// Whether the coupling of `spec` has a spring at each joint.
+fn has_coupling(spec: &HapticsSpec) -> bool {
+    spec.coupling_stiffness.iter().all(|stiffness| *stiffness > 0.0)
+}
+
+/// Share of the device's damping that the coupling's takes where it leaves the spring no room (1): the spring may then
+/// be two thirds as stiff as without a damper.
+const DAMPER: f64 = 1.0 / 3.0;
+
+/// Returns `spec` with the gains that break a bound changed so that they keep it, and the others as they are: the
+/// proxy's damping as [`damped`] raises it, the coupling's stiffness lowered, and its damping where no stiffness would
+/// do. The changed ones have [`DIGITS`] digits. The stiffness is zero where the device allows none.
+fn passive(spec: &HapticsSpec, source: &TorqueSource) -> HapticsSpec {
+    let mut passive = damped(spec, source);
+    for (damping, own) in passive.proxy_damping.iter_mut().zip(spec.proxy_damping.iter()) {
+        if *damping > *own {
+            *damping = at_least(*damping);
+        }
+    }
+    for joint in 0..source.joints() {
+        if spec.coupling_stiffness[joint] <= greatest_stiffness(spec, joint) {
+            continue;
+        }
+        if greatest_stiffness(spec, joint) <= 0.0 {
+            passive.coupling_damping[joint] = at_most(DAMPER * spec.device_damping[joint]);
+        }
+        passive.coupling_stiffness[joint] = at_most(greatest_stiffness(&passive, joint));
+    }
+    passive
+}
+
+/// The gains of `passive` that are not those of `spec`, as a scene has them: damping of the proxy, stiffness and damping
+/// of the coupling.
+fn changes(spec: &HapticsSpec, passive: &HapticsSpec) -> [Option<String>; 3] {
+    let gains: [(&str, fn(&HapticsSpec) -> &JointVector); 3] = [
+        ("proxy_damping", |gains| &gains.proxy_damping),
+        ("coupling_stiffness", |gains| &gains.coupling_stiffness),
+        ("coupling_damping", |gains| &gains.coupling_damping),
+    ];
+    gains.map(|(key, of)| (of(passive) != of(spec)).then(|| format!("{key} = {}", list(of(passive).iter().copied()))))
 }
 
 /// Digits that an advised gain has.

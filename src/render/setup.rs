@@ -7,7 +7,7 @@ use super::{
     live::LiveScene,
     npmi::Npmi,
     own_motion,
-    passivity::{self, Bound},
+    passivity::{self, Advice, Bound},
     session::Plan,
     source::TorqueSource,
 };
@@ -41,7 +41,7 @@ pub struct Setup {
     /// Those that are exceeded.
     pub exceeded: Vec<Bound>,
     /// A warning about the gains, with values that would be passive; absent if all bounds hold.
-    pub advice: Option<String>,
+    pub advice: Option<Advice>,
     /// The motions that the scene does not name, made from the dataset's own contact.
     pub made_motions: Vec<&'static str>,
 }
@@ -111,10 +111,30 @@ impl Setup {
     ///
     /// # Errors
     /// When they do not make a loop.
-    pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<String>), Error> {
+    pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<Advice>), Error> {
         let live = self.haptics.source().live();
         let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, live)?;
         Ok((haptics, advice))
+    }
+
+    /// Puts gains that are passive in the place of those of the scene that are not, for `dataset`, from which this was
+    /// made. Returns these, as a scene has them.
+    ///
+    /// # Errors
+    /// When no coupling is passive with this device.
+    pub fn make_passive(&mut self, dataset: &Dataset) -> Result<Vec<String>, Error> {
+        let Some(Advice { passive, changes, .. }) = self.advice.take() else { return Ok(Vec::new()) };
+        let Some(gains) = passive else {
+            return Err("no stiffness of the coupling is passive: write the damping of the device in the scene, \
+                        [haptics] device_damping"
+                .into());
+        };
+        let live = self.haptics.source().live();
+        let Loop { haptics, bounds, gains, advice: left } =
+            haptic_loop(dataset, &self.chain, &self.scene, &gains, live)?;
+        self.exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
+        (self.haptics, self.bounds, self.scene.haptics, self.advice) = (Arc::new(haptics), bounds, gains, left);
+        Ok(changes)
     }
 
     /// A simulated device in a hand that follows `motion`.
@@ -195,7 +215,7 @@ struct Loop {
     bounds: Vec<Bound>,
     /// As they were given, those left to the dataset chosen.
     gains: HapticsSpec,
-    advice: Option<String>,
+    advice: Option<Advice>,
 }
 
 /// Makes the haptic loop over `dataset`, or the scene that is solved `live`, with `gains` in the place of those of its

@@ -70,7 +70,7 @@ impl Survey {
     fn add(&mut self, state: JointState) {
         self.stamped |= state.stamp > 0;
         self.has_effort |= state.effort.iter().any(|effort| effort.is_finite());
-        for joint in state.names.into_iter().filter(|joint| !joint.trim().is_empty()) {
+        for joint in state.names {
             if !self.numbers.contains_key(&joint) {
                 self.numbers.insert(joint.clone(), self.joints.len());
                 self.joints.push(joint);

@@ -17,15 +17,13 @@ pub(crate) fn read(path: &Path) -> Result<String, String> {
     if bytes.len() as u64 > MAX_BYTES {
         return Err(format!("it is longer than {MAX_BYTES} bytes, which no file of this kind is; check the path"));
     }
+    if bytes.contains(&0) {
+        return Err(
+            "it is no text, but a dataset or another binary file; give the text file that it was made from".into()
+        );
+    }
     String::from_utf8(bytes).map_err(|error| {
         let bytes = error.as_bytes();
-        if [b"\xff\xfe", b"\xfe\xff"].iter().any(|mark| bytes.starts_with(*mark)) {
-            return "it is UTF-16, not UTF-8: convert it with `iconv -f UTF-16 -t UTF-8`".into();
-        }
-        if bytes.contains(&0) {
-            return "it is no text, but a dataset or another binary file; give the text file that it was made from"
-                .into();
-        }
         let line = bytes[..error.utf8_error().valid_up_to()].iter().filter(|byte| **byte == b'\n').count() + 1;
         format!("line {line} is not UTF-8: convert it with iconv, if it is Latin-1 `iconv -f ISO-8859-1 -t UTF-8`")
     })

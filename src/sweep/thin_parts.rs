@@ -34,15 +34,35 @@ pub(super) fn notice(
     if passed.len() as f64 <= share * count as f64 {
         return None;
     }
+    let consequence = thinnest(&passed)?;
+    Some(format!(
+        "near {} of {count} random configurations in contact the arm {consequence}: shorten the ranges of the joints, or \
+         make the part thicker",
+        passed.len(),
+    ))
+}
+
+/// Says of which part the middle is passed, and what becomes of the torque there; none where no part is.
+fn thinnest(passed: &[(PastMiddle, JointVector)]) -> Option<String> {
     let (thinnest, q) = passed.iter().min_by(|(a, _), (b, _)| a.thickness.total_cmp(&b.thickness))?;
     Some(format!(
-        "near {} of {count} random configurations in contact the arm passes the middle of a part of the object, {:.1} \
-         mm thick at its thinnest, at q = [{}]: contact is with the closest surface, so the torque changes its sign in \
-         the middle and is zero beyond the part: shorten the ranges of the joints, or make the part thicker",
-        passed.len(),
+        "passes the middle of a part of the object, {:.1} mm thick at its thinnest, at q = [{}]: contact is with the \
+         closest surface, so the torque changes its sign in the middle and is zero beyond the part",
         1e3 * thinnest.thickness,
         q.iter().map(|q| format!("{q:.4}")).collect::<Vec<_>>().join(", ")
     ))
+}
+
+/// As [`notice`], of an arm that moved along `path` in small steps, with the configurations that are in contact.
+#[must_use]
+pub fn on_path(model: &Model<'_>, path: &[(JointVector, bool)]) -> Option<String> {
+    let steps = path.par_windows(2).filter(|step| step.iter().any(|(_, touches)| *touches));
+    let looked = steps.map_init(
+        || Proximity::new(model),
+        |proximity, step| Some((proximity.past_middle(&step[0].0, [step[1].0])?, step[1].0)),
+    );
+    let consequence = thinnest(&looked.flatten().collect::<Vec<_>>())?;
+    Some(format!("the arm {consequence}: press less deep, or make the part thicker"))
 }
 
 /// As [`notice`], for random configurations in the finest cells of `store` that have a corner in contact.

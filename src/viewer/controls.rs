@@ -10,6 +10,7 @@ use super::{
     theme::{CHOICE_WIDTH, GROUP_GAP},
     view_renderer::Quantity,
 };
+use crate::render::passivity::Advice;
 use crate::scene::{ContactLaw, EFFECTS, Effect, Interpolation, Scene, Tuning};
 use clap::ValueEnum as _;
 use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
@@ -56,7 +57,7 @@ impl Controls {
         &mut self,
         ui: &mut Ui,
         loaded: &Loaded,
-        advice: Option<&str>,
+        advice: Option<&Advice>,
         shown: &mut Shown,
         solvers: &[Solver],
     ) -> bool {
@@ -86,20 +87,24 @@ impl Controls {
         self.haptization(ui, loaded, solvers)
     }
 
-    fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, advice: Option<&str>) {
+    fn feel(&mut self, ui: &mut Ui, loaded: &Loaded, advice: Option<&Advice>) {
         let axes = &loaded.dataset.grid.axes;
         gains::joint(ui, axes, &mut self.joint);
         gains::legend(ui);
         gains::sliders(ui, axes, self.joint, &mut self.tuning.haptics, &self.original.haptics);
         gains::threshold(ui, &mut self.tuning.haptics);
         self.interpolation(ui, loaded);
-        match advice {
-            Some(advice) => ui.colored_label(ui.visuals().warn_fg_color, RichText::new(advice).small()),
-            None => {
-                let good = palette::of(ui.visuals()).good;
-                ui.colored_label(good, RichText::new("All gains within their passivity bounds").small())
-            }
+        let Some(advice) = advice else {
+            let good = palette::of(ui.visuals()).good;
+            ui.colored_label(good, RichText::new("All gains within their passivity bounds").small());
+            return;
         };
+        ui.colored_label(ui.visuals().warn_fg_color, RichText::new(&advice.text).small());
+        let button = ui.add_enabled(advice.passive.is_some(), Button::new("Use passive gains"));
+        let button = button.on_hover_text("Change what is beyond a bound so that it keeps it");
+        if let (Some(passive), true) = (&advice.passive, button.clicked()) {
+            self.tuning.haptics = passive.clone();
+        }
     }
 
     /// Shows how the torque is interpolated between grid points.

@@ -4,7 +4,7 @@ use crate::{
     Error, JointVector,
     dataset::Dataset,
     device::Motion,
-    render::{graphics::ContactForces, haptic::Haptics, live::LiveScene, setup::Setup},
+    render::{graphics::ContactForces, haptic::Haptics, live::LiveScene, passivity::Advice, setup::Setup},
     scene::{HapticsSpec, Scene, Tuning},
     sweep::SweepReport,
 };
@@ -81,7 +81,7 @@ impl Loaded {
     ///
     /// # Errors
     /// When they do not make a loop.
-    pub fn tuned(&self, gains: &HapticsSpec) -> Result<(Arc<Haptics>, Option<String>), Error> {
+    pub fn tuned(&self, gains: &HapticsSpec) -> Result<(Arc<Haptics>, Option<Advice>), Error> {
         let (haptics, advice) = self.setup.retuned(&self.dataset, gains)?;
         Ok((Arc::new(haptics), advice))
     }

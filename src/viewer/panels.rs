@@ -174,7 +174,7 @@ impl Viewer {
             .show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
-                    bake = controls.show(ui, loaded, session.advice.as_deref(), &mut self.scene.shown, &self.solvers);
+                    bake = controls.show(ui, loaded, session.advice.as_ref(), &mut self.scene.shown, &self.solvers);
                 });
             });
         let right = share(size.x, SPACE_RANGE);

@@ -12,7 +12,11 @@ use super::{
     slices::Slices,
     theme::{FINE_GAP, GAP, PLANE_SHARE, ROOM_FOR_BOTH},
 };
-use crate::{Error, JointVector, render::haptic::Haptics, scene::HapticsSpec};
+use crate::{
+    Error, JointVector,
+    render::{haptic::Haptics, passivity::Advice},
+    scene::HapticsSpec,
+};
 use eframe::egui::Ui;
 use std::sync::Arc;
 
@@ -30,13 +34,13 @@ pub struct Session {
     cloud: Cloud,
     pub controls: Controls,
     /// A warning about the gains, if they are beyond their passivity bounds.
-    pub advice: Option<String>,
+    pub advice: Option<Advice>,
     /// Whether the cloud is shown where there is no height for plane and cloud.
     cloud_first: bool,
 }
 
 /// A loop, and what is wrong with its gains.
-type Tuned = (Arc<Haptics>, Option<String>);
+type Tuned = (Arc<Haptics>, Option<Advice>);
 
 impl Session {
     /// Begins to feel `loaded`, with `device` where one is chosen.

@@ -352,6 +352,10 @@ fn a_scene_that_names_neither_motions_nor_damping_is_pressed_and_scraped_passive
     let advice: Vec<&str> = told.lines().filter(|line| line.contains("not passive")).collect();
     assert_eq!(advice.len(), 1, "{told}");
     let named = advice[0].split("proxy_damping = ").nth(1).unwrap();
+    let session = ["play", "named.haptize", "--seconds", "0.1", "--passive-gains"];
+    let told = text(&haptize(folder.path(), &session).stderr);
+    let made = format!("the gains are made passive: proxy_damping = {named}");
+    assert!(told.contains(&made) && !told.contains("not passive"), "{told}");
     assert!(!bake(named).contains("not passive"), "{named}");
 }
 

@@ -114,7 +114,15 @@ fn messages_name_the_file_and_what_helps() {
     std::fs::write(path("latin.toml"), b"# A remark\nname = \"W\xfcrfel\"\n").unwrap();
     std::fs::write(path("latin.urdf"), b"<robot>\n<link name=\"W\xfcrfel\"/></robot>").unwrap();
     std::fs::write(path("wide.toml"), [0xff, 0xfe, b'a', 0]).unwrap();
-    std::fs::write(path("bytes.csv"), [0xff, 0xfe, 0, 1, 2]).unwrap();
+    for (name, text) in [
+        ("bare", "[[joint]]\nname = 'a'\nposition = 3\ntorque = 4\n"),
+        ("list", "filter = [3]\n"),
+        ("odd", "[time]\ncolumn = 1.5\n"),
+    ] {
+        std::fs::write(path(&format!("{name}.toml")), text).unwrap();
+    }
+    std::fs::write(path("wide.csv"), [0xfe, 0xff, 0, b't']).unwrap();
+    std::fs::write(path("bytes.csv"), [0xff, 0, 1, 2]).unwrap();
     forge(home.path(), "broken.haptize", |dataset| dataset.scene = "name = 3".into());
     for (arguments, expected, not) in [
         (&["play", "x.haptize", "--motion", "pres"][..], "`press`", "permissions"),
@@ -127,7 +135,23 @@ fn messages_name_the_file_and_what_helps() {
             "binary",
         ),
         (&["import", "latin.urdf", "--tip", "a"], "latin.urdf: cannot read the robot: line 2 is not UTF-8", "binary"),
-        (&["gridize", "empty.csv", "--columns", "wide.toml", "--step", "1"], "it is UTF-16, not UTF-8", "binary"),
+        (
+            &["gridize", "empty.csv", "--columns", "wide.toml", "--step", "1"],
+            "it is text in UTF-16, not UTF-8",
+            "binary",
+        ),
+        (
+            &["gridize", "empty.csv", "--columns", "bare.toml", "--step", "1"],
+            "bare.toml:3:12: invalid type: integer `3`, expected a table, as in `{ column = \"NAME\" }`",
+            "Quantity",
+        ),
+        (&["gridize", "empty.csv", "--columns", "list.toml", "--step", "1"], "list.toml:1:", "struct"),
+        (
+            &["gridize", "empty.csv", "--columns", "odd.toml", "--step", "1"],
+            "odd.toml:2:10: the name of a column or its number",
+            "ColumnName",
+        ),
+        (&["gridize", "wide.csv", "--step", "1"], "wide.csv: cannot be read: it is text in UTF-16, not UTF-8", "room"),
         (&["import", "x.haptize", "--tip", "a"], "x.haptize: cannot read the robot: it is no text", "UTF-8"),
         (
             &["gridize", "empty.csv", "--columns", "x.haptize", "--step", "1"],

@@ -10,9 +10,9 @@ const PLATE: &str = "v -0.02 -0.02 -0.001\nv 0.02 -0.02 -0.001\nv -0.02 0.02 -0.
     v -0.02 -0.02 0.001\nv 0.02 -0.02 0.001\nv -0.02 0.02 0.001\nv 0.02 0.02 0.001\n\
     f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 
-/// Pins pressed upwards into the plate, from 5 mm below its middle to `last` (m) beyond it, on a grid of this `step` (m),
-/// haptized by the command `arguments`. Returns what command and file tell of thin parts; both tell the same.
-fn told(last: f64, step: f64, arguments: &[&str]) -> String {
+/// A folder with the scene `plate.toml`, pins pressed upwards into the plate, from 5 mm below its middle to `last` (m)
+/// beyond it, on a grid of this `step` (m); and with `motion.csv`, which leads there.
+fn folder(last: f64, step: f64) -> Folder {
     let folder = Folder::new();
     std::fs::write(folder.0.path().join("plate.obj"), PLATE).unwrap();
     let scene = format!(
@@ -24,17 +24,25 @@ fn told(last: f64, step: f64, arguments: &[&str]) -> String {
     );
     std::fs::write(folder.0.path().join("plate.toml"), scene).unwrap();
     std::fs::write(folder.0.path().join("motion.csv"), format!("time,press\n0,-0.004\n0.3,{last}\n")).unwrap();
-    let run = |arguments: &[&str]| {
-        let output = haptize(folder.0.path(), arguments);
-        let [told, errors] = [&output.stdout, &output.stderr].map(|bytes| text(bytes));
-        assert!(output.status.success(), "{arguments:?}: {errors}");
-        told + &errors
-    };
+    folder
+}
+
+/// What the command `arguments` prints in `folder`.
+fn printed(folder: &Folder, arguments: &[&str]) -> String {
+    let output = haptize(folder.0.path(), arguments);
+    let [told, errors] = [&output.stdout, &output.stderr].map(|bytes| text(bytes));
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    told + &errors
+}
+
+/// What the command `arguments` and the file that it writes tell of thin parts; both tell the same.
+fn told(last: f64, step: f64, arguments: &[&str]) -> String {
+    let folder = folder(last, step);
     let sentence = |text: &str| {
         let begin = text.find("near ").filter(|_| text.contains("the middle of a part"));
         begin.map_or(String::new(), |begin| text[begin..].split(": shorten").next().unwrap().to_owned())
     };
-    let [told, kept] = [arguments, &["info", "plate.haptize"]].map(|arguments| sentence(&run(arguments)));
+    let [told, kept] = [arguments, &["info", "plate.haptize"]].map(|arguments| sentence(&printed(&folder, arguments)));
     assert_eq!(told, kept, "{arguments:?}");
     told
 }
@@ -49,6 +57,15 @@ fn it_is_told_with_the_thickness_when_the_arm_passes_the_middle_of_a_thin_part_i
     }
     // To 0.1 mm below the middle.
     assert_eq!(told(-0.0001, 0.0007, &bake), "");
+}
+
+#[test]
+fn a_session_without_a_dataset_tells_it_afterwards() {
+    let play = ["play", "plate.toml", "--motion", "motion.csv", "-o", "out"];
+    let through = printed(&folder(0.005, 0.001), &play);
+    assert!(through.contains("the arm passes the middle") && through.contains(", 2.0 mm thick"), "{through}");
+    let shallow = printed(&folder(-0.001, 0.001), &play);
+    assert!(!shallow.contains("the middle of a part"), "{shallow}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use super::{
     super::{Dataset, Grid, error::unwritable, file, replace_file},
     meaning::{Meaning, lines, lines_name},
 };
-use crate::Error;
+use crate::{Error, memory};
 use hdf5_writer::{AttributeBuilder, ByteOrder, DatasetBuilder, Datatype, Hdf5Builder, Hdf5WritePlan, WriteOptions};
 use safetensors::Dtype;
 use std::{
@@ -22,6 +22,11 @@ use std::{
 };
 
 pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
+    let bytes: usize = file::arrays(dataset).map(|(_, tensor)| tensor.contents.len()).sum();
+    // The dataset itself is there already.
+    memory::check(bytes.saturating_mul(2)).map_err(|shortage| {
+        Error::at(path, format_args!("{shortage}; or export with --format npz, which takes no memory"))
+    })?;
     let written = plan(dataset)
         .and_then(|plan| plan.encode(WriteOptions { byte_order: ByteOrder::LittleEndian, ..WriteOptions::default() }))
         .map_err(io::Error::other)

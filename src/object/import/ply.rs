@@ -49,21 +49,31 @@ const MAX_HEADER: u64 = 1 << 16;
 /// Longest run of digits in it: more may be no `u64`.
 const MAX_DIGITS: usize = 18;
 
-/// The header, up to `end_header`, without numbers that the parser cannot hold.
+/// The header, up to `end_header`, without remarks, a byte-order mark and numbers that the parser cannot hold.
 fn header_text(stream: &mut impl BufRead) -> Result<Vec<u8>, String> {
-    let mut text = Vec::new();
+    let (mut text, mut read) = (Vec::new(), 0);
     loop {
-        let start = text.len();
-        let read = stream.take(MAX_HEADER - start as u64).read_until(b'\n', &mut text);
-        if read.map_err(|error| error.to_string())? == 0 {
+        let mut line = Vec::new();
+        stream.take(MAX_HEADER - read).read_until(b'\n', &mut line).map_err(|error| error.to_string())?;
+        if line.is_empty() {
             return Err(format!("it has no header that ends within {MAX_HEADER} bytes"));
         }
-        let line = text[start..].trim_ascii();
-        let is_remark = line.starts_with(b"comment") || line.starts_with(b"obj_info");
-        if !is_remark && line.split(|byte| !byte.is_ascii_digit()).any(|digits| digits.len() > MAX_DIGITS) {
+        let mark: &[u8] = if read == 0 { "\u{feff}".as_bytes() } else { b"" };
+        read += line.len() as u64;
+        let line = line.strip_prefix(mark).unwrap_or(&line);
+        let words = line.trim_ascii();
+        if words.contains(&b'\r') {
+            return Err("its lines end by carriage returns alone: export the mesh again".to_owned());
+        }
+        // Remarks may be of any encoding and length.
+        if words.starts_with(b"comment") || words.starts_with(b"obj_info") {
+            continue;
+        }
+        if words.split(|byte| !byte.is_ascii_digit()).any(|digits| digits.len() > MAX_DIGITS) {
             return Err(format!("its header has a number of more than {MAX_DIGITS} digits"));
         }
-        if line == b"end_header" {
+        text.extend(line);
+        if words == b"end_header" {
             return Ok(text);
         }
     }

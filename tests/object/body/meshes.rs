@@ -1,7 +1,10 @@
 //! Mesh files: every way in which programs write them is read whole, or refused with the place and the remedy.
 
 use super::*;
-use haptize::{Error, ErrorKind};
+use haptize::{
+    Error, ErrorKind,
+    object::{LengthUnit, MeshSummary},
+};
 
 #[test]
 fn the_same_cube_comes_out_of_all_formats() {
@@ -61,6 +64,24 @@ fn groups_of_an_obj_file_are_joined_at_their_seams() {
         build_from("obj", format!("mtllib missing.mtl\n{nodes}o one\n{}\n", faces.join("\n")).as_bytes()).unwrap();
     assert_eq!((object.rest.len(), object.triangles.len()), (8, 12));
     assert!(object.warnings.is_empty(), "{:?}", object.warnings);
+}
+
+#[test]
+fn a_mesh_is_summed_up_before_it_is_an_object() {
+    let cube = MeshSummary::read(&dataset("cube.stl")).unwrap();
+    assert_eq!((cube.nodes, cube.triangles, cube.parts, cube.defect), (8, 12, 1, None));
+    assert_eq!((cube.low, cube.high), (-DVec3::ONE, DVec3::ONE));
+    // Twelve edges of 2 and six diagonals, each met by two triangles.
+    let mean = (24.0 * 2.0 + 12.0 * 8.0_f64.sqrt()) / 36.0;
+    assert!((cube.volume - 8.0).abs() < 1e-12 && (cube.mean_edge - mean).abs() < 1e-12);
+    let organ = MeshSummary::read(&dataset("organ.obj")).unwrap();
+    assert_eq!((cube.unit, organ.unit), (LengthUnit::M, LengthUnit::Mm));
+    let (nodes, faces) = prism(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0);
+    let folder = tempfile::tempdir().unwrap();
+    let open = folder.path().join("open.obj");
+    std::fs::write(&open, obj_of(&nodes, &faces[1..])).unwrap();
+    let open = MeshSummary::read(&open).unwrap();
+    assert!(open.parts == 0 && open.defect.unwrap().contains("hole"));
 }
 
 #[test]
@@ -162,6 +183,31 @@ fn an_stl_file_is_read_whole_however_its_program_writes_it() {
     ] {
         let error = build_from("stl", &content).unwrap_err().to_string();
         assert!(error.contains(expected), "{expected}: {error}");
+    }
+}
+
+#[test]
+fn remarks_of_any_encoding_do_not_keep_a_mesh_from_being_read() {
+    let text = std::fs::read_to_string(dataset("cube.ply")).unwrap();
+    let remark = [b"\ncomment W\xfcrfel".as_slice(), &[b'9'; 30], b"\n"].concat();
+    let (ply, rest) = text.split_at(text.find('\n').unwrap());
+    let [_, (_, binary)] = binary_cubes();
+    for content in [
+        format!("\u{feff}{text}").into_bytes(),
+        [ply.as_bytes(), &remark, &rest.as_bytes()[1..]].concat(),
+        [b"ply", &remark[..], &binary[4..]].concat(),
+        text.replace('\n', "\r\n").into_bytes(),
+    ] {
+        let object = build_from("ply", &content).unwrap();
+        assert_eq!((object.rest.len(), object.triangles.len()), (8, 12));
+    }
+    let returns = build_from("ply", text.replace('\n', "\r").as_bytes()).unwrap_err().to_string();
+    assert!(returns.contains("carriage returns alone: export the mesh again"), "{returns}");
+    for extension in ["ply", "stl", "obj"] {
+        for mark in [b"\xff\xfe", b"\xfe\xff"] {
+            let wide = build_from(extension, &[&mark[..], b"p\0l\0y\0"].concat()).unwrap_err().to_string();
+            assert!(wide.contains("it is text in UTF-16, not UTF-8: convert it by"), "{extension}: {wide}");
+        }
     }
 }
 

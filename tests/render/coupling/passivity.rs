@@ -170,8 +170,10 @@ fn advised(advice: &str, choice: bool) -> BTreeMap<String, String> {
             gains.remove("device_damping");
         }
         if alternative.is_none() || choice {
-            let (key, value) = alternative.unwrap_or(remedy).split_once(" = ").unwrap();
-            gains.insert(key.to_owned(), value.split(" if ").next().unwrap().to_owned());
+            for gain in alternative.unwrap_or(remedy).split(" and ") {
+                let (key, value) = gain.split_once(" = ").unwrap();
+                gains.insert(key.to_owned(), value.split(" if ").next().unwrap().to_owned());
+            }
         }
     }
     gains
@@ -192,7 +194,7 @@ fn gains_that_are_advised_are_passive() {
             ("boundary_slope", 100.0, 1e5),
             ("proxy_damping", 0.1, 100.0),
             ("coupling_stiffness", 100.0, 1e5),
-            ("coupling_damping", 1e-3, 1.0),
+            ("coupling_damping", 1e-3, 4.0),
             ("device_damping", 1.5, 10.0),
         ]
         .map(|(key, low, high)| (key.to_owned(), list(low, high)))
@@ -205,10 +207,22 @@ fn gains_that_are_advised_are_passive() {
         }
         let advice = |gains: &BTreeMap<String, String>| {
             let lines: String = gains.iter().map(|(key, value)| format!("{key} = {value}\n")).collect();
-            setup(&format!("[haptics]\n{lines}")).unwrap().advice
+            setup(&format!("[haptics]\n{lines}")).unwrap().advice.map(|advice| advice.text)
         };
         let Some(first) = advice(&gains) else { continue };
         refused += 1;
+        let lines: String = gains.iter().map(|(key, value)| format!("{key} = {value}\n")).collect();
+        let spec = format!("[haptics]\n{lines}");
+        let mut made = setup(&spec).unwrap();
+        let changes = made.make_passive(&block(&spec)).unwrap();
+        assert!(made.exceeded.is_empty() && made.advice.is_none(), "{spec}: {changes:?}");
+        // What the scene would have: the same gains, and nothing that was passive is changed.
+        let mut written = gains.clone();
+        written.extend(
+            changes.iter().map(|gain| gain.split_once(" = ").unwrap()).map(|(key, value)| (key.into(), value.into())),
+        );
+        assert_eq!(advice(&written), None, "{changes:?}");
+        assert_eq!(made.make_passive(&block(&spec)).unwrap(), [""; 0]);
         for choice in [false, true] {
             let mut followed = gains.clone();
             followed.extend(advised(&first, choice));

@@ -1,0 +1,107 @@
+//! What a mesh file holds, before it is an object of a scene.
+
+use super::{Body, LengthUnit, import, topology};
+use crate::{Error, scene::Placement};
+use glam::DVec3;
+use serde::Serialize;
+use std::path::Path;
+
+/// Endings of files that are read as meshes.
+const ENDINGS: [&str; 4] = ["obj", "stl", "ply", "msh"];
+
+/// Longest body that is taken to be given in metres where no unit is named (m).
+const LONGEST: f64 = 2.0;
+
+/// A mesh file in numbers. Lengths are in the unit of the file's coordinates.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MeshSummary {
+    /// Nodes of the surface, and all.
+    pub surface_nodes: usize,
+    /// See `surface_nodes`.
+    pub nodes: usize,
+    /// Triangles of the surface.
+    pub triangles: usize,
+    /// Tetrahedra; none in a file of a surface.
+    pub tetrahedra: usize,
+    /// Connected parts of the surface; zero where it cannot be an object's.
+    pub parts: usize,
+    /// Least coordinates.
+    pub low: DVec3,
+    /// Greatest coordinates.
+    pub high: DVec3,
+    /// Mean length of the surface's edges.
+    pub mean_edge: f64,
+    /// Volume that the surface encloses.
+    pub volume: f64,
+    /// The unit that the size suggests.
+    pub unit: LengthUnit,
+    /// What its reader says of it.
+    pub warnings: Vec<String>,
+    /// Why it cannot be an object, and what to do.
+    pub defect: Option<String>,
+}
+
+impl MeshSummary {
+    /// Returns whether the name of `file` is that of a mesh.
+    #[must_use]
+    pub fn is_mesh(file: &Path) -> bool {
+        let ending = file.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+    }
+
+    /// Reads and checks the mesh in `file`.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn read(file: &Path) -> Result<Self, Error> {
+        let mut warnings = Vec::new();
+        let is_volume = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("msh"));
+        let mut body = if is_volume {
+            import::read_tetrahedra(file, &Placement::METRES, &[], &mut warnings)?
+        } else {
+            Body::shell(import::read(file, &Placement::METRES, &mut warnings)?)
+        };
+        // Of a length in metres; the unit below says what it may be.
+        warnings.retain(|warning| !warning.contains("scale = 0.001"));
+        let surface = &body.nodes[..body.surface_nodes];
+        let closed = topology::close(surface, &mut body.triangles);
+        let parts = closed.as_ref().map_or(0, |closed| closed.components.len());
+        let defect = match closed {
+            Ok(closed) => {
+                warnings.extend(closed.warnings);
+                None
+            }
+            Err(defect) => Some(defect),
+        };
+        let [low, high] = import::corners(&body.nodes);
+        Ok(Self {
+            surface_nodes: body.surface_nodes,
+            nodes: body.nodes.len(),
+            triangles: body.triangles.len(),
+            tetrahedra: body.tetrahedra.len(),
+            parts,
+            low,
+            high,
+            mean_edge: topology::mean_edge(&body.nodes, &body.triangles),
+            volume: enclosed(&body.nodes, &body.triangles),
+            unit: suggested(high - low),
+            warnings,
+            defect,
+        })
+    }
+}
+
+/// The unit in which a body of this `size` may be given.
+pub(super) fn suggested(size: DVec3) -> LengthUnit {
+    if size.max_element() > LONGEST { LengthUnit::Mm } else { LengthUnit::M }
+}
+
+/// Volume that the closed surface of `triangles` encloses.
+pub(super) fn enclosed(nodes: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
+    let corner = |node: u32| nodes.get(node as usize).copied().unwrap_or_default();
+    let volumes = triangles.iter().map(|triangle| {
+        let [a, b, c] = triangle.map(corner);
+        a.dot(b.cross(c)) / 6.0
+    });
+    volumes.sum::<f64>().abs()
+}
