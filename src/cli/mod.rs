@@ -57,6 +57,7 @@ mod scan;
 mod shape;
 mod shard;
 mod shell;
+mod twin;
 mod view;
 mod watch;
 
@@ -140,6 +141,8 @@ enum Command {
     Scan(scan::Arguments),
     /// Find the surface of a scanned object from the log of its scan.
     Shape(shape::Arguments),
+    /// Make a scene of what was scanned: an elastic object that explains the log of its scan.
+    Twin(twin::Arguments),
     /// Open a dataset or a scene in a window.
     View(view::Arguments),
 }
@@ -167,6 +170,7 @@ impl Command {
             Self::Reach(arguments) => reach::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
             Self::Shape(arguments) => shape::run(arguments),
+            Self::Twin(arguments) => twin::run(arguments),
             Self::View(arguments) => view::run(arguments),
         }
     }

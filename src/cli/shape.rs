@@ -8,7 +8,7 @@ use super::{
 use crate::{
     dataset::replace_file,
     proxy::Chain,
-    report::{PIXELS, scanned::scanned},
+    report::{PIXELS, scanned::surface},
     scan::ScanLog,
     scene::ScanScene,
     twin::{Approaches, Carving, ScannedShape},
@@ -50,10 +50,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let replaced = output::check(&output, Content::Product, [arguments.log.as_path()])?;
     output::check(&picture, Content::Product, [arguments.log.as_path()])?;
-    let (approaches, _, shape) = found(&arguments.log, arguments.ground)?;
+    let (approaches, scan, shape) = found(&arguments.log, arguments.ground)?;
     write(&output, shape.obj().as_bytes())?;
-    write(&picture, &scanned(&shape).pixels(PIXELS)?.png()?)?;
-    Report::new(&Found { replaced, ..Found::new(&approaches, &shape, &output, &picture) })
+    write(&picture, &surface(&shape).pixels(PIXELS)?.png()?)?;
+    let nodes = Chain::new(&scan.proxy).nodes.len();
+    Report::new(&Found { replaced, ..Found::new((&approaches, nodes), &shape, &output, &picture) })
 }
 
 /// The shape of what `log` scanned, with the approaches and the scene of the scan.
@@ -93,6 +94,8 @@ pub struct Found {
     carving: Carving,
     /// Height of the ground (m).
     ground: f64,
+    /// Contact nodes of the arm.
+    arm_nodes: usize,
     nodes: usize,
     triangles: usize,
     #[serde(flatten)]
@@ -101,7 +104,12 @@ pub struct Found {
 
 impl Found {
     /// What is told of `shape`.
-    pub fn new(approaches: &Approaches, shape: &ScannedShape, output: &Path, picture: &Path) -> Self {
+    pub fn new(
+        (approaches, arm_nodes): (&Approaches, usize),
+        shape: &ScannedShape,
+        output: &Path,
+        picture: &Path,
+    ) -> Self {
         Self {
             file: output.display().to_string(),
             picture: picture.display().to_string(),
@@ -114,6 +122,7 @@ impl Found {
             deviation: shape.deviation(),
             carving: shape.carving,
             ground: shape.ground,
+            arm_nodes,
             nodes: shape.nodes.len(),
             triangles: shape.triangles.len(),
             replaced: None,
@@ -124,7 +133,7 @@ impl Found {
 impl Describe for Found {
     fn describe(&self, text: &mut Text) {
         let Self { file, picture, onsets, untouched, begun, exponent, spacing, held_out, deviation, .. } = self;
-        let Self { carving, ground, nodes, triangles, replaced, .. } = self;
+        let Self { carving, ground, arm_nodes, nodes, triangles, replaced, .. } = self;
         let mm = |length: &f64| 1e3 * length;
         text.line(format_args!("{file}: a surface of {nodes} nodes and {triangles} triangles"));
         let others = match begun {
@@ -144,6 +153,11 @@ impl Describe for Found {
         let Carving { places, carved } = carving;
         text.row("carving", format_args!("{places} free places of nodes, {carved} of which moved the surface"));
         text.row("ground", format_args!("z = {ground:.4} m"));
+        if *arm_nodes > 1 {
+            let note = "the node that goes before the others, or lies nearest to the surface, is taken to touch: where a link \
+                        leans on the object, another may";
+            text.row("note", format_args!("of the arm's {arm_nodes} nodes {note}"));
+        }
         text.row("picture", picture);
         replaced.describe(text);
     }

@@ -36,10 +36,10 @@ pub struct Onset {
     pub path: f64,
     /// Standard deviation of that (m).
     pub deviation: f64,
-    /// Torque of the first row in contact, that of the free rows subtracted (N m or N).
-    pub torque: JointVector,
     /// Change of the configuration per metre of the path, towards the object (rad/m or 1).
     pub direction: JointVector,
+    /// Number of the approach.
+    pub line: usize,
 }
 
 /// The rows of a scan by what they tell of its object's shape.
@@ -49,8 +49,10 @@ pub struct Approaches {
     pub onsets: Vec<Onset>,
     /// Configurations in which nothing touches (rad or m).
     pub free: Vec<JointVector>,
-    /// Steady rows in contact.
+    /// Steady rows in contact, the torque of the free rows before them subtracted.
     pub contact: Vec<ScanRow>,
+    /// Points of an approach: by their quotient a row's point is the number of its approach.
+    pub levels: usize,
     /// Exponent p of the hinge (1).
     pub exponent: f64,
     /// Approaches that never touch.
@@ -61,6 +63,7 @@ pub struct Approaches {
 
 /// One approach that touches.
 struct Approach<'a> {
+    number: usize,
     /// The last free row.
     free: &'a ScanRow,
     /// Rows in contact.
@@ -70,7 +73,6 @@ struct Approach<'a> {
     /// Projected torque of each, and its standard deviation.
     heights: Vec<f64>,
     noise: Vec<f64>,
-    torque: JointVector,
 }
 
 impl Approaches {
@@ -94,17 +96,18 @@ impl Approaches {
         }
         let node = scene.scan.plan.node(chain.nodes.len());
         let touches = |row: &ScanRow| row.torque.norm() > scene.scan.control.epsilon;
-        let (mut found, mut approaches) = (Self::default(), Vec::new());
-        for line in lines.values_mut() {
+        let (mut found, mut approaches) = (Self { levels, ..Self::default() }, Vec::new());
+        for (&number, line) in &mut lines {
             line.sort_by_key(|row| row.point);
             let first = line.iter().position(|row| touches(row)).unwrap_or(line.len());
             let (free, contact) = line.split_at(first);
             found.free.extend(free.iter().map(|row| row.q));
-            found.contact.extend(contact.iter().map(|row| **row));
+            let base = mean(free);
+            found.contact.extend(contact.iter().map(|row| ScanRow { torque: less(&row.torque, &base), ..**row }));
             match (free.last(), contact.is_empty()) {
                 (_, true) => found.untouched += 1,
                 (None, false) => found.begun += 1,
-                (Some(_), false) => approaches.push(Approach::new(free, contact, chain, node)),
+                (Some(_), false) => approaches.push(Approach::new(number, (free, contact), chain, node)),
             }
         }
         let steps = ((EXPONENTS[1] - EXPONENTS[0]) / EXPONENT_STEP).round() as usize;
@@ -128,22 +131,16 @@ impl Approaches {
 }
 
 impl<'a> Approach<'a> {
-    fn new(free: &[&'a ScanRow], contact: &[&'a ScanRow], chain: &Chain, node: usize) -> Self {
+    fn new(number: usize, (free, contact): (&[&'a ScanRow], &[&'a ScanRow]), chain: &Chain, node: usize) -> Self {
         let mut pose = chain.new_pose();
         let mut place = |row: &ScanRow| {
             chain.pose(&row.q, &mut pose);
             pose.nodes[node]
         };
         let last = free[free.len() - 1];
-        let mean = |rows: &[&ScanRow]| {
-            let mut mean = JointVector::zeros(last.q.len());
-            rows.iter().for_each(|row| add(&mut mean, &row.torque, 1.0 / rows.len() as f64));
-            mean
-        };
         let base = mean(free);
         let rows: Vec<&ScanRow> = contact.iter().take(HINGE_ROWS).copied().collect();
-        let mut direction = mean(&rows);
-        add(&mut direction, &base, -1.0);
+        let mut direction = less(&mean(&rows), &base);
         let size = direction.norm().max(f64::MIN_POSITIVE);
         direction.iter_mut().for_each(|x| *x /= size);
         let height = |row: &&ScanRow| direction.dot(&row.torque) - direction.dot(&base);
@@ -158,10 +155,8 @@ impl<'a> Approach<'a> {
             path
         });
         let paths = paths.collect();
-        let mut torque = rows[0].torque;
-        add(&mut torque, &base, -1.0);
         let (heights, noise) = (rows.iter().map(height).collect(), rows.iter().map(noise).collect());
-        Self { free: last, paths, heights, noise, torque, rows }
+        Self { number, free: last, paths, heights, noise, rows }
     }
 
     /// The onset with exponent `p` and its deviation by noise alone (m), and the misfit over noise with its degrees of
@@ -204,14 +199,27 @@ impl<'a> Approach<'a> {
     fn onset(&self, [path, deviation]: [f64; 2], scale: f64) -> Onset {
         let (from, to) = (&self.free.q, &self.rows[0].q);
         let first = self.paths[0].max(f64::MIN_POSITIVE);
-        let mut direction = *to;
-        add(&mut direction, from, -1.0);
+        let mut direction = less(to, from);
         direction.iter_mut().for_each(|x| *x /= first);
         let mut q = *from;
         add(&mut q, &direction, path);
         let deviation = (scale * deviation).min(UNIFORM * first);
-        Onset { q, path, deviation, torque: self.torque, direction }
+        Onset { q, path, deviation, direction, line: self.number }
     }
+}
+
+/// The mean torque of `rows`, zero without any.
+fn mean(rows: &[&ScanRow]) -> JointVector {
+    let mut mean = rows.first().map_or_else(JointVector::default, |row| JointVector::zeros(row.q.len()));
+    rows.iter().for_each(|row| add(&mut mean, &row.torque, 1.0 / rows.len() as f64));
+    mean
+}
+
+/// `vector` less `other`, which has no more entries.
+fn less(vector: &JointVector, other: &[f64]) -> JointVector {
+    let mut less = *vector;
+    add(&mut less, other, -1.0);
+    less
 }
 
 /// Adds `factor` times `other` to `sum`.

@@ -4,11 +4,11 @@
 //! such balls lie on a surface of the same normals, so that N is that of the plane through the nearest centres (Hoppe et
 //! al. 1992), on the side that the arm came from. The direction of force is no normal: friction turns it.
 //!
-//! Of an arm with several nodes it is not known which one touched. The torque of one contact is J_i^T N times a force;
-//! of those nodes that lie before the field nearest to it, the one touches whose J_i^T N is the most like the measured
-//! torque. Free rows say that no node is inside: where one is, the field is moved out to it (carving).
+//! Of an arm with several nodes the one that goes before all others is taken to touch, then the one nearest to the field.
+//! The torque would tell more, but friction turns the force by more than what two nodes of a link differ in. Free rows say
+//! that no node is inside: where one is, the field is moved out to it (carving).
 //!
-//! The body ends at the ground, and beside the approaches where the next one would have spoken. The convex hull would be
+//! The body ends at the ground, and beside the approaches half way to where the next one would have been. The convex hull would be
 //! too much: between measured parts nothing is known.
 
 use super::nets;
@@ -37,9 +37,14 @@ const NEIGHBOURS: usize = 9;
 const ITERATIONS: usize = 30;
 const FLAT: f64 = 1e-9;
 
-/// Where the body ends beside the approaches, in spacings (1): a single approach that is missing from a grid leaves no
-/// hole. Larger: the body goes on farther where nothing was measured.
-const REACH: f64 = 1.05;
+/// Where the body ends beside the approaches, in spacings (1): half way to where the next one would have been.
+const REACH: f64 = 0.5;
+
+/// Distance of the approaches around a place, in spacings (1): on the border of a grid there are some on one side.
+const AROUND: f64 = 1.5;
+
+/// Distance of a place of the surface from one that was touched, in spacings, up to which it is known (1).
+const KNOWN: f64 = 1.05;
 
 /// Least cosine of an approach to the surface's inward normal at which it tells where the surface is beside its place
 /// (1): at less than thirty degrees to the surface the arm slides along it, and often there is no further place beyond.
@@ -51,15 +56,14 @@ const CARVED: f64 = 0.1;
 /// Free places that move the field, at most, in onsets (1).
 const MOST_CARVED: f64 = 0.5;
 
-/// Nodes before the field that may have touched: those nearer to it than the nearest, and so much, in spacings (1).
-const CANDIDATES: f64 = 0.5;
-
 /// First smoothing, before it is known how well values predict each other, in spacings (1).
 const SMOOTHING: f64 = 0.02;
 
 /// The place of an onset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touched {
+    /// Number of the approach.
+    pub line: usize,
     /// The node that touched.
     pub node: usize,
     /// Place on the surface (m), and its outward normal.
@@ -130,7 +134,7 @@ impl ScannedShape {
         let (mut field, mut scale, mut held_out) = fit(&touched, &carved, spacing, SMOOTHING * spacing)?;
         for round in 0..ROUNDS {
             for (touched, (onset, pose)) in touched.iter_mut().zip(onsets.iter().zip(&poses)) {
-                touched.assign(&field, (onset, pose), chain, spacing);
+                touched.assign(&field, (onset, pose), chain);
             }
             turn(&mut touched, &poses, chain);
             if round + 1 == ROUNDS / 2 || round + 1 == ROUNDS {
@@ -154,13 +158,20 @@ impl ScannedShape {
         Ok(shape)
     }
 
-    /// How far `x` lies beside the nearest approach, less how far that reaches (m).
+    /// How far `x` lies beside the approaches, less how far they reach (m): the mean offset of those around it, weighted by
+    /// their nearness. Beyond the last line of a grid that is the distance from it, to a hundredth of the spacing; where one
+    /// is missing from the grid, it is at most 0.35 spacings.
     fn beside(&self, x: DVec3) -> f64 {
-        let across = |touched: &Touched| {
-            let off = x - touched.place;
-            (off - touched.approach * off.dot(touched.approach)).length()
-        };
-        self.touched.iter().map(across).fold(f64::INFINITY, f64::min) - REACH * self.spacing
+        let around = AROUND * self.spacing;
+        let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+        for touched in &self.touched {
+            let off = touched.place - x;
+            let across = off - touched.approach * off.dot(touched.approach);
+            let weight = (1.0 - across.length_squared() / (around * around)).max(0.0).powi(2);
+            (sum, weights) = (sum + weight * across, weights + weight);
+        }
+        let offset = if weights > 0.0 { (sum / weights).length() } else { around };
+        offset - REACH * self.spacing
     }
 
     /// Standard deviation of the surface where it was touched, rms (m).
@@ -174,7 +185,7 @@ impl ScannedShape {
     fn mesh(&mut self, scale: f64) {
         let low = self.touched.iter().map(|touched| touched.place).fold(DVec3::INFINITY, DVec3::min);
         let high = self.touched.iter().map(|touched| touched.place).fold(DVec3::NEG_INFINITY, DVec3::max);
-        let margin = DVec3::splat((REACH + 2.0) * self.spacing);
+        let margin = DVec3::splat((AROUND + 2.0) * self.spacing);
         let low = (low - margin).with_z(self.ground - margin.z);
         let shape = &*self;
         let value = |x: DVec3| shape.field.value(x).max(shape.ground - x.z).max(shape.beside(x));
@@ -182,7 +193,7 @@ impl ScannedShape {
         let faced: Vec<DVec3> =
             shape.touched.iter().filter(|touched| touched.is_faced()).map(|touched| touched.place).collect();
         let is_measured = |x: &DVec3| {
-            let is_near = faced.iter().any(|place| place.distance(*x) < REACH * shape.spacing);
+            let is_near = faced.iter().any(|place| place.distance(*x) < KNOWN * shape.spacing);
             is_near && shape.field.value(*x).abs() < CARVED * shape.spacing
         };
         let measured: Vec<bool> = nodes.iter().map(is_measured).collect();
@@ -220,24 +231,15 @@ fn spacing(touched: &[Touched]) -> Result<f64, Error> {
     if spacing > 0.0 { Ok(spacing) } else { Err("the approaches touch one place only: spread them".into()) }
 }
 
-/// The node whose torque along its own approach is the most like the measured one.
+/// The node that goes before all others.
 fn first_guess(onset: &super::Onset, pose: &Pose, chain: &Chain) -> Touched {
-    let back = |node: usize| -onset.velocity(chain, pose, node).normalize_or_zero();
-    let all = (0..chain.nodes.len()).filter(|node| back(*node) != DVec3::ZERO);
-    let unlike = |node: usize| unlikeness(onset, pose, chain, (node, back(node)));
-    let node = all.min_by(|a, b| unlike(*a).total_cmp(&unlike(*b))).unwrap_or(0);
-    let normal = back(node);
-    let place = pose.nodes[node] - chain.nodes[node].radius * normal;
-    Touched { node, place, normal, approach: -normal, deviation: onset.deviation }
-}
-
-/// The part of the torque of `onset` that no force along `normal` on the node explains, over all of it (1).
-fn unlikeness(onset: &super::Onset, pose: &Pose, chain: &Chain, (node, normal): (usize, DVec3)) -> f64 {
-    let mut lever = onset.torque;
-    lever.fill(0.0);
-    chain.add_torque(pose, node, normal, &mut lever);
-    let along = onset.torque.dot(&lever).max(0.0) / lever.norm().max(f64::MIN_POSITIVE);
-    (onset.torque.dot(&onset.torque) - along * along).max(0.0).sqrt() / onset.torque.norm().max(f64::MIN_POSITIVE)
+    let velocities: Vec<DVec3> = (0..chain.nodes.len()).map(|node| onset.velocity(chain, pose, node)).collect();
+    let fastest = velocities.iter().copied().max_by(|a, b| a.length().total_cmp(&b.length())).unwrap_or_default();
+    let forward = |node: &usize| pose.nodes[*node].dot(fastest.normalize_or_zero()) + chain.nodes[*node].radius;
+    let node = (0..chain.nodes.len()).max_by(|a, b| forward(a).total_cmp(&forward(b))).unwrap_or(0);
+    let approach = velocities[node].normalize_or_zero();
+    let place = pose.nodes[node] + chain.nodes[node].radius * approach;
+    Touched { line: onset.line, node, place, normal: -approach, approach, deviation: onset.deviation }
 }
 
 impl Touched {
@@ -247,15 +249,10 @@ impl Touched {
         -self.approach.dot(self.normal) > GRAZING
     }
 
-    /// Takes the node that touched from `field`.
-    fn assign(&mut self, field: &RadialField, at: (&super::Onset, &Pose), chain: &Chain, spacing: f64) {
-        let (onset, pose) = at;
-        let gap = |node: usize| field.value(pose.nodes[node]) - chain.nodes[node].radius;
-        let nearest = (0..pose.nodes.len()).map(gap).fold(f64::INFINITY, f64::min);
-        let normal = |node: usize| field.gradient(pose.nodes[node]).normalize_or(self.normal);
-        let near = (0..pose.nodes.len()).filter(|node| gap(*node) <= nearest + CANDIDATES * spacing);
-        let unlike = |node: usize| unlikeness(onset, pose, chain, (node, normal(node)));
-        self.node = near.min_by(|a, b| unlike(*a).total_cmp(&unlike(*b))).unwrap_or(self.node);
+    /// Takes the node that is nearest to `field`.
+    fn assign(&mut self, field: &RadialField, (onset, pose): (&super::Onset, &Pose), chain: &Chain) {
+        let gap = |node: &usize| field.value(pose.nodes[*node]) - chain.nodes[*node].radius;
+        self.node = (0..pose.nodes.len()).min_by(|a, b| gap(a).total_cmp(&gap(b))).unwrap_or(self.node);
         let velocity = onset.velocity(chain, pose, self.node);
         self.approach = velocity.normalize_or(self.approach);
         self.deviation = onset.deviation * velocity.length();
