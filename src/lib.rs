@@ -94,6 +94,7 @@ pub mod device;
 
 pub mod control;
 pub mod scan;
+pub mod twin;
 
 pub mod render;
 

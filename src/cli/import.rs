@@ -115,8 +115,22 @@ fn command(arguments: &Arguments) -> String {
     escaped(&format!("{command} --spacing {}", arguments.spacing)).into_owned()
 }
 
+/// Refuses a scene that is there, before the work that makes another.
+pub fn refuse_existing(output: &Path) -> Result<(), Failure> {
+    let is_there = std::fs::symlink_metadata(output).is_ok();
+    if is_there && !files::is_forced() { Err(taken(output)) } else { Ok(()) }
+}
+
+fn taken(output: &Path) -> Failure {
+    format!(
+        "{}: there is a file already; nothing is written: name another file, or replace it with --force",
+        output.display()
+    )
+    .into()
+}
+
 /// Writes a new file. A scene that is there may hold the work of a person, and is left as it is.
-fn write(output: &Path, scene: &str) -> Result<(), Failure> {
+pub fn write(output: &Path, scene: &str) -> Result<(), Failure> {
     if files::is_forced() {
         return Ok(replace_file(output, |file| file.write_all(scene.as_bytes()))?);
     }
@@ -124,13 +138,7 @@ fn write(output: &Path, scene: &str) -> Result<(), Failure> {
         |error: std::io::Error| -> Failure { format!("{}: cannot be written: {error}", output.display()).into() };
     let mut file = match OpenOptions::new().write(true).create_new(true).open(output) {
         Ok(file) => file,
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            return Err(format!(
-                "{}: there is a file already; nothing is written: name another file, or replace it with --force",
-                output.display()
-            )
-            .into());
-        }
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => return Err(taken(output)),
         Err(error) => return Err(failed(error)),
     };
     let written = file.write_all(scene.as_bytes()).and_then(|()| file.sync_all());

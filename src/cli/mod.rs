@@ -55,8 +55,10 @@ mod reach;
 mod refine;
 mod report;
 mod scan;
+mod shape;
 mod shard;
 mod shell;
+mod twin;
 mod view;
 mod watch;
 
@@ -138,6 +140,10 @@ enum Command {
     Reach(reach::Arguments),
     /// Measure a real object by touching it with a rig (the rig that ships is simulated).
     Scan(scan::Arguments),
+    /// Find the surface of a scanned object from the log of its scan.
+    Shape(shape::Arguments),
+    /// Make a scene of what was scanned: an elastic object that explains the log of its scan.
+    Twin(twin::Arguments),
     /// Open a dataset or a scene in a window.
     View(view::Arguments),
 }
@@ -164,6 +170,8 @@ impl Command {
             Self::Play(arguments) => play::run(arguments),
             Self::Reach(arguments) => reach::run(arguments),
             Self::Scan(arguments) => scan::run(arguments),
+            Self::Shape(arguments) => shape::run(arguments),
+            Self::Twin(arguments) => twin::run(arguments),
             Self::View(arguments) => view::run(arguments),
         }
     }

@@ -10,6 +10,7 @@ use crate::{
     render::recording::SIGNATURE as SESSION,
     scan::SIGNATURE,
     scene::Scene,
+    twin::OBJ,
 };
 use serde::Serialize;
 use std::{
@@ -60,11 +61,12 @@ impl Content {
         let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg"));
         let page = holds(b".TH haptize") || begins(b"# The paper's");
         let archive = begins(b"PK") && holds(b"torque.npy");
+        let shape = begins(OBJ.as_bytes());
         let hdf5 = begins(b"\x89HDF") && holds(b"torque");
         match () {
             () if may_be_dataset(start) => Some(Self::Dataset),
             () if log => Some(Self::Log),
-            () if figure || page || archive || hdf5 || is_table(start) => Some(Self::Product),
+            () if figure || page || archive || shape || hdf5 || is_table(start) => Some(Self::Product),
             () => None,
         }
     }

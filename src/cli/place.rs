@@ -77,7 +77,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut changed = Vec::new();
     if let Some(mesh) = &arguments.mesh {
         let turn = arguments.turn.unwrap_or_default();
-        let draft = Draft::new(mesh, &name(mesh, &scene.path)?, arguments.unit, turn, arguments.young)?;
+        let draft =
+            Draft::new((mesh, &name(mesh, &scene.path)?), arguments.unit, turn, arguments.young, (None, Draft::HELD))?;
         let unit = 1e3 * draft.unit.metres();
         changed.push(format!("{}, whose unit is {unit} mm, {} kPa", mesh.display(), 1e-3 * arguments.young));
         let mut text = SceneText::new(&scene.text, &scene.path)?;

@@ -28,6 +28,7 @@ mod thin_parts;
 
 pub use backend::{Backend, CHUNKS_IN_FLIGHT, Work};
 pub(crate) use equilibrium::energy::RESIDUAL_FLOOR;
+pub use equilibrium::rest::Sensitivity;
 pub use live::{LiveContact, LiveSolver};
 pub use mesh_ripple::MeshRipple;
 pub use model::{Model, MotionBound};

@@ -2,7 +2,7 @@
 
 use super::detection::Detection;
 use super::equilibrium::energy::{EnergySearch, SolverStats, StoppingCriteria};
-use super::equilibrium::rest::{Guess, RestProgram};
+use super::equilibrium::rest::{Guess, RestProgram, Sensitivity};
 use super::model::Model;
 use super::reach;
 use super::reactions::Reactions;
@@ -184,6 +184,12 @@ impl<'a> Solver<'a> {
             }
             displacement
         })
+    }
+
+    /// How the torque of the last configuration solved depends on the object, where it touches and its surface is at rest.
+    #[must_use]
+    pub fn sensitivity(&self) -> Option<Sensitivity> {
+        (self.held_by == HeldBy::Rest).then(|| self.rest.sensitivity(self.model, &self.pose))
     }
 
     /// The proxy's pose at the last configuration solved.

@@ -26,9 +26,6 @@ const SKIN_WIDTH: f64 = 3.0;
 /// elements.
 const POISSON: f64 = 0.45;
 
-/// Height up to which a body is held, over its own (1): the part on which it lies.
-const HELD: f64 = 0.1;
-
 /// Unit of length of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -77,12 +74,22 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// The surface in `file`, which the scene calls `name`, of Young's modulus `young` (Pa), turned about x, then y,
-    /// then z (rad).
+    /// Height up to which a body is held, over its own (1): the part on which it lies.
+    pub const HELD: f64 = 0.1;
+
+    /// The surface in `file`, which the scene calls `name`, of Young's modulus `young` (Pa) under a skin of `width` (m),
+    /// by default three edges of the mesh, turned about x, then y, then z (rad), and held up to the part `held` of its
+    /// height.
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn new(file: &Path, name: &str, unit: Option<LengthUnit>, turn: DVec3, young: f64) -> Result<Self, Error> {
+    pub fn new(
+        (file, name): (&Path, &str),
+        unit: Option<LengthUnit>,
+        turn: DVec3,
+        young: f64,
+        (width, held): (Option<f64>, f64),
+    ) -> Result<Self, Error> {
         let (nodes, triangles) = import::read(file, &Placement::METRES, &mut Vec::new())?;
         let [low, high] = import::corners(&nodes);
         let unit = unit.unwrap_or_else(|| suggested(high - low));
@@ -91,7 +98,7 @@ impl Draft {
         let [low, high] = import::corners(&nodes);
         let volume = enclosed(&nodes, &triangles);
         let mass = DENSITY * volume / nodes.len().max(1) as f64;
-        let width = SKIN_WIDTH * topology::mean_edge(&nodes, &triangles);
+        let width = width.unwrap_or_else(|| SKIN_WIDTH * topology::mean_edge(&nodes, &triangles));
         let facts = BodyFacts {
             name,
             scale,
@@ -102,6 +109,7 @@ impl Draft {
             volume,
             mass,
             width,
+            held,
         };
         let mut tables = String::new();
         // Writing to a string fails only where memory does.
@@ -124,6 +132,8 @@ struct BodyFacts<'a> {
     mass: f64,
     /// Of the skin (m).
     width: f64,
+    /// Part of the height that is held (1).
+    held: f64,
 }
 
 impl BodyFacts<'_> {
@@ -143,10 +153,10 @@ impl BodyFacts<'_> {
         entry(text, "young", &format!("{:?}", self.young), "Pa")?;
         entry(text, "poisson", &number(POISSON, 3), "")?;
         writeln!(text, "\n[object.skin]")?;
-        let meaning = "m, over which the dent of a point is rounded: three edges of the mesh";
+        let meaning = "m, over which the dent of a point is rounded";
         entry(text, "width", &number(self.width, 5), meaning)?;
         writeln!(text, "\n[object.ground]")?;
         entry(text, "clamp", "true", "the body lies on something")?;
-        entry(text, "below", &number((HELD - 0.5) * self.height, 5), "m, height up to which it is held")
+        entry(text, "below", &number((self.held - 0.5) * self.height, 5), "m, height up to which it is held")
     }
 }

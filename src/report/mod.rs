@@ -8,6 +8,7 @@ pub mod hysteresis;
 pub mod jitter;
 pub mod object;
 pub mod press;
+pub mod scanned;
 pub mod slices;
 pub mod space;
 

@@ -48,6 +48,11 @@ impl<'a> SceneText<'a> {
         Ok(())
     }
 
+    /// Removes the table `name`, if it is there.
+    pub fn remove(&mut self, name: &str) {
+        self.document.remove(name);
+    }
+
     /// Moves the object by `motion` (m): its centre, the height below which it is held, and its inclusions.
     pub fn move_object(&mut self, motion: DVec3) {
         let Some(object) = self.document.get_mut("object").and_then(Item::as_table_like_mut) else { return };

@@ -1,15 +1,19 @@
 //! Contact with the surface at rest: the torque is the gradient of the energy, on every kind of body, at every
 //! stiffness and depth.
 
-use crate::fixture::{arm, random_configurations, sphere, torus};
+use crate::fixture::{SPHERE_CENTRE, arm, random_configurations, sphere, torus};
+use glam::DVec3;
 use haptize::JointVector;
 use haptize::contact::{Backend, Equilibrium, Model, Solver, Status};
 use haptize::fixtures::Random;
 use haptize::fixtures::bodies::{self, PAPER};
 use haptize::joint_matrix::lower;
-use haptize::object::Object;
+use haptize::object::{Compliance, Object};
 use haptize::proxy::Chain;
-use haptize::scene::{ContactLaw, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind};
+use haptize::scene::{
+    ContactLaw, ContactSpec, ContactSurface, ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material,
+    ObjectSpec, Scene, Shape, SkinSpec, SpringKind,
+};
 use haptize::sweep::CpuBackend;
 
 /// Contact at rest of stiffness kc at a contact point (N/m).
@@ -176,6 +180,90 @@ fn the_tangent_is_the_derivative_of_the_torque() {
             assert!(worst < limit, "{name}, {kc} N/m: {worst}");
         }
     }
+}
+
+/// Step of central differences by the logarithm of a stiffness: its square is what they leave.
+const LOG_STEP: f64 = 1e-4;
+
+/// Whatever changes the object's compliance, and the stiffness of contact, changes the torque as its sensitivity says.
+#[test]
+fn the_sensitivity_is_the_derivative_of_the_torque_by_what_the_object_is_made_of() {
+    let spec = |[young, ground, bending]: [f64; 3]| ObjectSpec {
+        material: Material::Elastic(ElasticSpec {
+            young: 1e4 * young,
+            poisson: 0.3,
+            cell: Some(0.02),
+            inclusions: Vec::new(),
+        }),
+        ground: Some(GroundSpec {
+            stiffness: GroundStiffness::PerArea(1e6 * ground),
+            nodes: GroundNodes::Below(SPHERE_CENTRE.z - 0.02),
+        }),
+        skin: Some(SkinSpec { tension: 0.0, bending: 0.01 * bending, foundation: 0.0 }),
+        ..crate::fixture::spec(
+            Shape::Sphere { centre: SPHERE_CENTRE, radius: 0.05, rings: 9, segments: 10 },
+            SpringKind::Isotropic,
+        )
+    };
+    let chain = Chain::new(&arm(0.008));
+    let built = |k: usize, log: f64| {
+        let mut factors = [1.0; 3];
+        if k < 3 {
+            factors[k] = log.exp()
+        } else {
+            factors.fill(log.exp())
+        }
+        Object::build(&spec(factors)).unwrap()
+    };
+    let here = built(0, 0.0);
+    let model = Model::new(&here, &chain, contact(1e3));
+    let mut solver = Solver::new(&model);
+    let torque = |object: &Object, kc: f64, q: &[f64]| Solver::new(&Model::new(object, &chain, contact(kc))).solve(q);
+    let places: Vec<Vec<f64>> = random_configurations(7, 40)
+        .into_iter()
+        .filter(|q| solver.solve(q).status == Status::Contact)
+        .take(6)
+        .collect();
+    assert_eq!(places.len(), 6);
+    let mut worst = [0.0_f64; 5];
+    for (k, worst) in worst.iter_mut().enumerate() {
+        // Of each stiffness of the object, of all of them, and of contact.
+        let [before, after] = [-LOG_STEP, LOG_STEP].map(|log| built(k, if k < 4 { log } else { 0.0 }));
+        let compliances = [&before, &after].map(Compliance::new);
+        for q in &places {
+            let equilibrium = solver.solve(q);
+            let sensitivity = solver.sensitivity().unwrap();
+            let kc = |log: f64| if k < 4 { 1e3 } else { 1e3 * log.exp() };
+            let ends = [torque(&before, kc(-LOG_STEP), q), torque(&after, kc(LOG_STEP), q)];
+            if ends.iter().any(|end| touched(end) != touched(&equilibrium)) {
+                continue;
+            }
+            let load = |b: usize| DVec3::from_slice(&sensitivity.load[3 * b..]);
+            let by_compliance = |adjoint: &Vec<f64>| -> f64 {
+                let nodes = sensitivity.nodes.iter().enumerate();
+                let pairs = nodes.clone().flat_map(|a| nodes.clone().map(move |b| (a, b)));
+                pairs
+                    .map(|((a, &i), (b, &j))| {
+                        let [before, after] = compliances.each_ref().map(|c| c.block(i as usize, j as usize));
+                        DVec3::from_slice(&adjoint[3 * a..]).dot((after - before) * load(b)) / (2.0 * LOG_STEP)
+                    })
+                    .sum()
+            };
+            for joint in 0..q.len() {
+                let slope = (ends[1].torque[joint] - ends[0].torque[joint]) / (2.0 * LOG_STEP);
+                let said = match k {
+                    4 => sensitivity.by_contact[joint],
+                    _ => by_compliance(&sensitivity.adjoints[joint]),
+                };
+                *worst = worst.max((slope - said).abs() / equilibrium.torque.norm());
+                if k == 3 {
+                    *worst = worst.max((slope - sensitivity.by_modulus()[joint]).abs() / equilibrium.torque.norm());
+                }
+            }
+        }
+    }
+    println!("by modulus, ground, skin, all of these, contact: {worst:?}");
+    assert!(worst.iter().all(|worst| (0.0..1e-6).contains(worst) && *worst > 0.0), "{worst:?}");
 }
 
 /// Step of central differences along an edge (rad): the torque bends over some 0.1 rad, which leaves 1e-8 of it.

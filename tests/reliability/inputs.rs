@@ -30,7 +30,7 @@ fn refused(folder: &Path, arguments: &[&str], name: &str, expected: &str) {
 }
 
 /// Every argument by which a command reads a file; `@` stands for it.
-const READERS: [&[&str]; 23] = [
+const READERS: [&[&str]; 25] = [
     &["bake", "@"],
     &["bake", "@", "--max-error", "5%", "--refine", "2"],
     &["bake", "@", "--shard", "1/2"],
@@ -50,6 +50,8 @@ const READERS: [&[&str]; 23] = [
     &["view", "@", "--screenshot", "y.png"],
     &["import", "@", "--tip", "hand"],
     &["scan", "@"],
+    &["shape", "@"],
+    &["twin", "@"],
     &["gridize", "@", "--step", "0.03"],
     &["gridize", "log.csv", "--step", "0.03", "--columns", "@"],
     &["gridize", "log.csv", "--step", "0.03", "--columns", "columns.toml", "--scene", "@"],

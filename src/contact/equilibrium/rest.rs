@@ -17,7 +17,10 @@
 //! those that the surface has bulged up to, until there are no more. Along a way the rows that pushed last are there
 //! from the beginning ([`Guess::Last`]): the solution is the same, and is found sooner.
 
+mod sensitivity;
 mod tangent;
+
+pub use sensitivity::Sensitivity;
 
 use crate::contact::detection::Detection;
 use crate::contact::equilibrium::energy::SolverStats;

@@ -28,28 +28,69 @@ use glam::{DMat3, DVec3};
 /// of the second derivative. The rounding of the gradient, 1e-15, leaves its share of this: 1e-10.
 const STEP: f64 = 1e-5;
 
+/// How the program changes when the joints move under the same forces.
+pub(super) struct Moved {
+    /// Rows that push.
+    pub pushing: Vec<usize>,
+    /// dl of each joint on the support (N/rad).
+    pub loads: Vec<Vec<f64>>,
+    /// C dl of each joint (m/rad).
+    pub responses: Vec<Vec<f64>>,
+    /// P, row by row (m/rad).
+    pub deepening: Vec<[f64; MAX_JOINTS]>,
+    /// S^-1 P (N/rad).
+    pub answers: Vec<[f64; MAX_JOINTS]>,
+}
+
 impl RestProgram {
-    /// Returns the tangent at the solution that was found last, of the configuration that `detection` has taken up,
-    /// with the proxy in `pose` (N m/rad).
-    pub fn tangent(&self, model: &Model, detection: &mut Detection, pose: &Pose) -> JointMatrix {
+    /// Returns how the solution that was found last changes with the joints of the proxy in `pose`.
+    pub(super) fn moved(&self, model: &Model, pose: &Pose) -> Moved {
         let Self { support, rows, slots, compliance, .. } = self;
         let joints = model.chain.joints.len();
         let springs = Springs { contacts: rows, slots, kc: model.kc };
         let pushing: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].multiplier > 0.0).collect();
-        self.displace(model, detection);
-        let mut tangent = JointMatrix::default();
         let mut loads = vec![vec![0.0; support.order()]; joints];
-        // P, row by row.
         let mut deepening = vec![[0.0; MAX_JOINTS]; pushing.len()];
         for (&i, deepening) in pushing.iter().zip(&mut deepening) {
             let (row, force) = (&rows[i], self.force(i));
+            for (k, load) in loads.iter_mut().enumerate() {
+                let column = model.chain.jacobian_column(pose, row.proxy_node as usize, k);
+                springs.add_reaction(i, &stretched_and_bent(row, 0.0, &Variation::translation(-column)), load);
+                deepening[k] = -force.dot(column) / row.multiplier;
+            }
+        }
+        let respond = |load: &Vec<f64>| {
+            let mut response = vec![0.0; load.len()];
+            support.multiply(load, &mut response);
+            response
+        };
+        let responses: Vec<Vec<f64>> = loads.iter().map(respond).collect();
+        for (&i, deepening) in pushing.iter().zip(&mut deepening) {
+            for (deepening, response) in deepening.iter_mut().zip(&responses) {
+                *deepening -= springs.depth_change(i, response);
+            }
+        }
+        let row = |i: usize| pushing.iter().map(move |j| compliance[i * rows.len() + j]);
+        let mut factor: Vec<f64> = pushing.iter().flat_map(|i| row(*i)).collect();
+        cholesky::factorize(&mut factor, pushing.len());
+        let mut answers = deepening.clone();
+        cholesky::solve(&factor, &mut answers);
+        Moved { pushing, loads, responses, deepening, answers }
+    }
+
+    /// Returns the tangent at the solution that was found last, of the configuration that `detection` has taken up,
+    /// with the proxy in `pose` (N m/rad).
+    pub fn tangent(&self, model: &Model, detection: &mut Detection, pose: &Pose) -> JointMatrix {
+        let joints = model.chain.joints.len();
+        let Moved { pushing, loads, responses, deepening, answers } = self.moved(model, pose);
+        self.displace(model, detection);
+        let mut tangent = JointMatrix::default();
+        for &i in &pushing {
+            let (row, force) = (&self.rows[i], self.force(i));
             let node = row.proxy_node as usize;
             let columns: Vec<DVec3> = (0..joints).map(|k| model.chain.jacobian_column(pose, node, k)).collect();
             let bend = bend(model, detection, node);
             for k in 0..joints {
-                let reaction = stretched_and_bent(row, 0.0, &Variation::translation(-columns[k]));
-                springs.add_reaction(i, &reaction, &mut loads[k]);
-                deepening[k] = -force.dot(columns[k]) / row.multiplier;
                 for l in 0..=k {
                     let turn = match model.chain.joints[l].kind {
                         JointKind::Revolute => pose.axes[l].cross(columns[k]),
@@ -60,19 +101,9 @@ impl RestProgram {
                 }
             }
         }
-        let mut moved = vec![0.0; support.order()];
-        for k in 0..joints {
-            support.multiply(&loads[k], &mut moved);
-            (0..=k).for_each(|l| add_symmetric(&mut tangent, k, l, dot(&loads[l], &moved)));
-            for (&i, deepening) in pushing.iter().zip(&mut deepening) {
-                deepening[k] -= springs.depth_change(i, &moved);
-            }
+        for (k, response) in responses.iter().enumerate() {
+            (0..=k).for_each(|l| add_symmetric(&mut tangent, k, l, dot(&loads[l], response)));
         }
-        let row = |i: usize| pushing.iter().map(move |j| compliance[i * rows.len() + j]);
-        let mut factor: Vec<f64> = pushing.iter().flat_map(|i| row(*i)).collect();
-        cholesky::factorize(&mut factor, pushing.len());
-        let mut answers = deepening.clone();
-        cholesky::solve(&factor, &mut answers);
         for (deepening, answer) in deepening.iter().zip(&answers) {
             for (k, answer) in answer.iter().enumerate().take(joints) {
                 (0..=k).for_each(|l| add_symmetric(&mut tangent, k, l, -deepening[l] * answer));

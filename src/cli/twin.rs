@@ -1,0 +1,140 @@
+//! `haptize twin`: a scene of what was scanned.
+
+use super::{
+    Failure,
+    bar::Bar,
+    import, interrupt,
+    output::{self, Content},
+    report::{Describe, Report, Text},
+    shape::{Found, found, write},
+    shell,
+};
+use crate::{
+    JointVector,
+    contact::Model,
+    object::Object,
+    proxy::Chain,
+    report::{PIXELS, scanned::stiffness},
+    scene::{Material, Scene},
+    twin::{Modulus, Watched, twin_scene},
+};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `haptize twin`.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  haptize twin sponge.csv --ground -0.05
+  haptize twin tissue.csv --width 0.008 -o twin.toml")]
+pub struct Arguments {
+    /// A log written by `haptize scan`.
+    log: PathBuf,
+    /// Height of the ground on which the object lies (m); by default a spacing below the lowest place that was reached.
+    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    ground: Option<f64>,
+    /// Width over which the dent of a point is rounded (m); by default three edges of the surface. The wider, the softer
+    /// is the object that explains the scan.
+    #[arg(long, value_name = "W", value_parser = length, allow_negative_numbers = true)]
+    width: Option<f64>,
+    /// The scene to write, which must not be there yet; by default the log's name in the current folder, ending in
+    /// _twin.toml. Its surface (.obj) and a picture (.png) are written beside it.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+}
+
+/// Young's modulus from which the search begins (Pa): that of soft tissue.
+const YOUNG: f64 = 1e4;
+
+fn length(text: &str) -> Result<f64, String> {
+    let width: f64 = text.trim().parse().map_err(|_| format!("{text:?} is no number"))?;
+    if width > 0.0 && width.is_finite() { Ok(width) } else { Err("a width is positive".into()) }
+}
+
+/// Finds surface and modulus, and writes the scene.
+pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let output = match &arguments.output {
+        Some(output) => output.clone(),
+        None => {
+            let name = arguments.log.file_stem().ok_or("the log's path names no file; give -o")?;
+            PathBuf::from(format!("{}_twin.toml", name.to_string_lossy()))
+        }
+    };
+    if !Scene::is_at(&output) {
+        return Err(format!("{}: a scene's name ends in .toml", output.display()).into());
+    }
+    import::refuse_existing(&output)?;
+    let [mesh, picture] = ["obj", "png"].map(|extension| output.with_extension(extension));
+    for file in [&mesh, &picture] {
+        output::check(file, Content::Product, [arguments.log.as_path()])?;
+    }
+    let (approaches, scan, shape) = found(&arguments.log, arguments.ground)?;
+    write(&mesh, shape.obj().as_bytes())?;
+    let name = mesh.file_name().unwrap_or_default().to_string_lossy();
+    let of_modulus = |young: f64| {
+        let mesh = (mesh.as_path(), &*name);
+        twin_scene((&scan.text, &output), mesh, (&shape, &approaches), young, arguments.width)
+    };
+    let scene = of_modulus(YOUNG)?;
+    let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
+    let bar = Bar::new("rows", "{wide_bar} {pos}/{len} rows, {eta} left");
+    let mut progress = |done: usize, rows: usize| bar.set(done as u64, rows as u64, String::new());
+    let watched = &mut Watched { stop: interrupt::stop_flag(), progress: &mut progress };
+    let rows: Vec<JointVector> = approaches.contact.iter().map(|row| row.q).collect();
+    let mut model = Model::reaching(&object, &chain, scene.contact, &rows)?;
+    let modulus = Modulus::fit(&mut model, YOUNG, (&approaches, &shape), watched);
+    bar.finish();
+    interrupt::over();
+    let modulus = modulus.map_err(|error| error.within(arguments.log.display()))?;
+    let scene = of_modulus(modulus.young)?;
+    write(&picture, &stiffness(&shape, &modulus).pixels(PIXELS)?.png()?)?;
+    import::write(&output, &scene.text)?;
+    let shape = Found::new((&approaches, chain.nodes.len()), &shape, &mesh, &picture);
+    let (poisson, width) = given(&scene);
+    Report::new(&Twin { scene: output.display().to_string(), modulus, poisson, width, shape })
+}
+
+/// Poisson's ratio of the object of `scene` (1), and the width of its skin (m; see [`crate::scene::SkinSpec`]).
+fn given(scene: &Scene) -> (f64, f64) {
+    let Material::Elastic(elastic) = &scene.object.material else { return (0.0, 0.0) };
+    let bending = scene.object.skin.map_or(0.0, |skin| skin.bending);
+    (elastic.poisson, (2.0 * (1.0 - elastic.poisson * elastic.poisson) * bending / elastic.young).cbrt())
+}
+
+/// The twin of a scanned object.
+#[derive(Serialize)]
+struct Twin {
+    scene: String,
+    #[serde(flatten)]
+    modulus: Modulus,
+    /// What is taken for given: Poisson's ratio (1), width of the skin (m).
+    poisson: f64,
+    width: f64,
+    shape: Found,
+}
+
+impl Describe for Twin {
+    fn describe(&self, text: &mut Text) {
+        let Self { scene, modulus, poisson, width, shape } = self;
+        let Modulus { young, deviation, friction, misfit, torque, rows, counted, .. } = modulus;
+        shape.describe(text);
+        text.line(format_args!("{scene}: an elastic solid in this surface"));
+        text.row("modulus", format_args!("{:.2} kPa +- {:.1} %", 1e-3 * young, 100.0 * deviation));
+        text.row("friction", format_args!("{friction:.2}"));
+        text.row(
+            "given",
+            format_args!(
+                "Poisson's ratio {poisson}, a skin that rounds dents over {:.1} mm, the ground: torques do not tell them",
+                1e3 * width
+            ),
+        );
+        text.row(
+            "misfit",
+            format_args!(
+                "{:.1} % of the torque, rms over {counted} of {rows} rows in contact",
+                100.0 * misfit / torque
+            ),
+        );
+        text.row("next", format_args!("haptize play {}", shell::file(Path::new(scene))));
+    }
+}
