@@ -143,6 +143,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         files.push(file.clone());
     }
     files.push(ticks?);
+    let trace = &played.trace;
+    let path = || trace.ticks.iter().map(|tick| (tick.proxy, tick.sample.contact)).collect::<Vec<_>>();
+    // Of a dataset the bake has told it. Before the figures: the threads that draw those left out are held for good.
+    let thin_part = live.as_ref().and_then(|scene| thin_parts::on_path(scene.direct().model(), &path()));
     files.extend(write(&setup, &dataset, &played, &folder)?);
     let mut felt = PlaybackReport::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(beside) = beside {
@@ -150,10 +154,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let drawn = felt.draw(&folder, &played.trace)?;
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
-    let trace = &played.trace;
-    let path = || trace.ticks.iter().map(|tick| (tick.proxy, tick.sample.contact)).collect::<Vec<_>>();
-    // Of a dataset the bake has told it.
-    let thin_part = live.as_ref().and_then(|scene| thin_parts::on_path(scene.direct().model(), &path()));
     let tally = tally(trace);
     let summary = trace.summary();
     let fault = trace.ticks.iter().find_map(|tick| Some(Fault { time: tick.time, reason: tick.fault?.to_string() }));
