@@ -50,7 +50,7 @@ impl Body {
         };
         let relaxation = loaded.setup.scene.haptics.relaxation.as_ref();
         let (nodes, method) = (object.rest.len(), FrameMethod::suitable(object));
-        let graphics = GraphicsSpec { effects: *effects, ..graphics.clone() };
+        let graphics = GraphicsSpec { effects: *effects, ..*graphics };
         let period = 1.0 / graphics.rate;
         let update =
             FrameUpdate::remembering(Arc::clone(context), object, period, method, effects, relaxation.is_some())?;
