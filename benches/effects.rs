@@ -13,15 +13,15 @@
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
-use glam::DVec3;
 use haptize::{
     Error, JointVector,
     dataset::Dataset,
     device::Motion,
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate},
     render::{
-        graphics::{ContactForces, Graphics, Smoothing},
+        graphics::{ContactForces, DrawnForces, Graphics},
         haptic::Inputs,
+        session::Latest,
         setup::Setup,
     },
     scene::{EFFECTS, Effect, Scene},
@@ -79,7 +79,7 @@ fn main() {
         setups.iter().zip(&datasets).map(|(setup, dataset)| setup.graphics(dataset).unwrap()).collect();
     let frames = in_turns(ROUNDS, count, |k| {
         let Some(graphics) = &mut drawn[k] else { return Vec::new() };
-        places.iter().map(|(q, share)| timed(|| graphics.frame(q, *share)).0).collect()
+        places.iter().map(|(q, share)| timed(|| graphics.frame(&latest(q, *share))).0).collect()
     });
     let mut bodies = match Context::open(AdapterChoice::Any) {
         Ok(context) => Body::all(&Arc::new(context), &setups, &datasets).unwrap(),
@@ -179,11 +179,15 @@ fn felt(setup: &Setup, motion: &Motion) -> Vec<f64> {
     (0..blocks).map(block).collect()
 }
 
+/// The tick before a frame, with the proxy at `q`.
+fn latest(q: &JointVector, share: f64) -> Latest {
+    Latest { proxy: *q, share, dent: Some(0.0), ..Latest::default() }
+}
+
 /// The object of one variant on the GPU: forces are interpolated and smoothed by the host.
 struct Body {
     contact: ContactForces,
-    forces: Vec<DVec3>,
-    smoothing: Option<Smoothing>,
+    forces: DrawnForces,
     update: FrameUpdate,
 }
 
@@ -192,12 +196,19 @@ impl Body {
     fn all(context: &Arc<Context>, setups: &[Setup], datasets: &[Dataset]) -> Result<Vec<Option<Self>>, Error> {
         let body = |(setup, dataset): (&Setup, &Dataset)| {
             let (Some(object), Some(graphics)) = (&setup.object, &setup.scene.graphics) else { return Ok(None) };
+            let relaxation = setup.scene.haptics.relaxation.as_ref();
             let (nodes, period, method) = (object.rest.len(), 1.0 / graphics.rate, FrameMethod::suitable(object));
             Ok(Some(Self {
                 contact: ContactForces::new(dataset, nodes).unwrap(),
-                forces: vec![DVec3::ZERO; nodes],
-                smoothing: graphics.effects.smoothing.map(|time| Smoothing::new(time, period, nodes)),
-                update: FrameUpdate::new(Arc::clone(context), object, period, method, &graphics.effects)?,
+                forces: DrawnForces::new(nodes, graphics, relaxation),
+                update: FrameUpdate::remembering(
+                    Arc::clone(context),
+                    object,
+                    period,
+                    method,
+                    &graphics.effects,
+                    relaxation.is_some(),
+                )?,
             }))
         };
         setups.iter().zip(datasets).map(body).collect()
@@ -206,12 +217,9 @@ impl Body {
     /// A frame for each of `places`, and a wait for the last.
     fn play(&mut self, places: &[Place]) -> Result<(), Error> {
         for (q, share) in places {
-            self.contact.at(q, *share, &mut self.forces);
-            let forces = match &mut self.smoothing {
-                Some(smoothing) => smoothing.toward(&self.forces),
-                None => &self.forces,
-            };
-            self.update.step(forces)?;
+            self.forces.touch(&self.contact, &latest(q, *share));
+            let [contact, past] = self.forces.frame();
+            self.update.step_remembering(contact, past)?;
         }
         self.update.read()?;
         Ok(())

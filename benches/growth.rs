@@ -25,11 +25,7 @@ use haptize::{
     report::write_both,
     scene::{ProxyNodeSpec, Scene},
     store::{Store, record::width},
-    sweep::{
-        CpuBackend, build_object, grid_of,
-        refine::{Judge, Refine},
-        sample,
-    },
+    sweep::{CpuBackend, Reference, build_object, grid_of, refine::Refine, sample},
 };
 use rustix::time::{ClockId, clock_gettime};
 use std::{hint::black_box, path::Path};
@@ -119,7 +115,7 @@ fn cost(store: &Store, base: &Grid, (spent, solved): (f64, u64), error: f64, way
 }
 
 /// Fills a store and takes its costs.
-fn fill(refine: &Refine<'_>, judges: &mut [Judge; 2], backend: &mut CpuBackend<'_>) -> Cost {
+fn fill(refine: &Refine<'_>, judges: &mut [Reference; 2], backend: &mut CpuBackend<'_>) -> Cost {
     let begin = processor_time();
     let refined = refine.fill(judges, backend).unwrap();
     let spent = (processor_time() - begin, refined.solved as u64);
@@ -143,7 +139,7 @@ fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 2] {
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
     model.with_tangent = true;
-    let mut judges = [1, 2].map(|seed| Judge::new(&scene, &model, seed, JUDGED).unwrap());
+    let mut judges = [1, 2].map(|seed| Reference::in_contact(&scene, &model, seed, JUDGED).unwrap());
     let mut backend = CpuBackend::new(&model, 0).unwrap();
     let batch = backend.chunk();
     let refine = |base, levels, aim| Refine { model: &model, base, levels, aim, most, batch };

@@ -27,11 +27,7 @@ use haptize::{
         Nodes, Place, Space, Store,
         record::{slope, width},
     },
-    sweep::{
-        BackendChoice, Bake, CpuBackend, build_object,
-        refine::{Judge, Refine},
-        sample,
-    },
+    sweep::{BackendChoice, Bake, CpuBackend, Reference, build_object, refine::Refine, sample},
 };
 use std::{
     hint::black_box,
@@ -148,7 +144,7 @@ fn grid(scene: &Scene, spacing: f64) -> Grid {
 type Spent = (f64, f64, f64);
 
 /// Bakes `scene` over a grid of spacing `spacing` times its own, and prints what its interpolation errs by.
-fn dense_grid(scene: &Scene, spacing: f64, interpolation: Interpolation, unseen: &Judge) -> Spent {
+fn dense_grid(scene: &Scene, spacing: f64, interpolation: Interpolation, unseen: &Reference) -> Spent {
     let begin = Instant::now();
     let mut scene = scene.clone();
     let base = grid(&scene, spacing);
@@ -220,7 +216,7 @@ fn main() {
     let chain = Chain::new(&scene.proxy);
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
     model.with_tangent = true;
-    let mut judges = [11, 12].map(|seed| Judge::new(&scene, &model, seed, 1000).unwrap());
+    let mut judges = [11, 12].map(|seed| Reference::in_contact(&scene, &model, seed, 1000).unwrap());
     let mut backend = CpuBackend::new(&model, 0).unwrap();
     let batch = backend.chunk();
     println!("\nbase   levels  nodes  by level  bytes  solved  equilibria  seen  unseen  rounds  seconds");

@@ -1,11 +1,20 @@
 //! What failed: one sentence that names the place, the problem and the remedy, and a kind where code asks for it.
 
-use crate::{input, memory::Shortage, names};
+use crate::{
+    input,
+    memory::Shortage,
+    names::{self, is_disruptive},
+};
 use std::{
     fmt::Display,
     io,
+    ops::Range,
     path::{Path, PathBuf},
 };
+
+/// Most characters of a line that a message shows, and how many of them before the place.
+const EXCERPT_WIDTH: usize = 110;
+const EXCERPT_LEAD: usize = 60;
 
 /// Work failed.
 ///
@@ -61,6 +70,29 @@ impl Error {
     /// Returns what is wrong with a line, counted from one, of the file at `path`.
     pub(crate) fn on_line(path: &Path, line: u64, what: impl Display) -> Self {
         Self::new(format!("{}:{line}: {what}", shown(path))).in_file(path, Some((line as usize, 1)))
+    }
+
+    /// Returns what is wrong with the bytes `span` of `text`, the content of the file at `path`: behind it stands the
+    /// line, with carets under the place. A span beyond the text means its end.
+    pub(crate) fn in_text(path: &Path, text: &str, span: Range<usize>, what: impl Display) -> Self {
+        let start = text.floor_char_boundary(span.start);
+        let before = &text[..start];
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line_text = text[line_start..].lines().next().unwrap_or("");
+        let lead = text[line_start..start].chars().count();
+        let inside = text[start..text.floor_char_boundary(span.end.max(start))].lines().next().unwrap_or("");
+        let skipped = lead.saturating_sub(EXCERPT_LEAD);
+        // Some characters would act on the terminal, and tabs would move the caret.
+        let printable = |c: char| if is_disruptive(c) { ' ' } else { c };
+        let excerpt: String = line_text.chars().skip(skipped).take(EXCERPT_WIDTH).map(printable).collect();
+        let (line, column, lead) = (before.matches('\n').count() + 1, lead + 1, lead - skipped);
+        let carets = "^".repeat(inside.chars().count().min(EXCERPT_WIDTH.saturating_sub(lead)).max(1));
+        let gutter = line.to_string().len();
+        let (path_text, empty) = (shown(path), "");
+        Self::new(format!(
+            "{path_text}:{line}:{column}: {what}\n{empty:gutter$} |\n{line} | {excerpt}\n{empty:gutter$} | {empty:lead$}{carets}"
+        ))
+        .in_file(path, Some((line, column)))
     }
 
     /// Returns that the file at `path` cannot be read, and what to do.

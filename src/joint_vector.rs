@@ -50,6 +50,18 @@ impl JointVector {
         self.iter().zip(other).map(|(a, b)| a * b).sum()
     }
 
+    /// The same direction, no longer than `greatest`.
+    #[must_use]
+    pub fn shortened(&self, greatest: f64) -> Self {
+        let mut shorter = *self;
+        let square = self.dot(self);
+        if square > greatest * greatest {
+            let length = square.sqrt();
+            shorter.iter_mut().for_each(|entry| *entry *= greatest / length);
+        }
+        shorter
+    }
+
     /// True when every entry is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {

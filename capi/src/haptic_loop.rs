@@ -110,7 +110,8 @@ pub unsafe extern "C" fn hz_loop_open(
         crate::check_joints(haptics.joints())?;
         let begin = JointVector::zeros(haptics.joints());
         let of = DrivenLoop::new(haptics, &begin).map_err(|fault| argument(fault.to_string()))?;
-        let remarks: Vec<String> = advice.into_iter().chain(notice.map(str::to_owned)).collect();
+        let remarks: Vec<String> =
+            advice.map(|advice| advice.text).into_iter().chain(notice.map(str::to_owned)).collect();
         Ok((hz_loop { of, started: false }, remarks.join("\n")))
     };
     // SAFETY: as the caller promises.

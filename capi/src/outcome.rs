@@ -1,6 +1,6 @@
 //! How a call ended: a code, and where there is more to say a message in the caller's buffer.
 
-use haptize::{Error, ErrorKind, scene::SceneError};
+use haptize::{Error, ErrorKind};
 use std::{
     ffi::{CStr, c_char},
     io::{Cursor, Write},
@@ -51,12 +51,6 @@ impl From<Error> for Failure {
             _ => hz_code::HZ_SCENE,
         };
         Self { code, message: error.to_string() }
-    }
-}
-
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Error::from(error).into()
     }
 }
 

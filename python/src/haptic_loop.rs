@@ -77,7 +77,7 @@ impl Loop {
                 (Arc::new(retuned.0), retuned.1)
             }
         };
-        let warnings = notice.map(str::to_owned).into_iter().chain(advice).collect();
+        let warnings = notice.map(str::to_owned).into_iter().chain(advice.map(|advice| advice.text)).collect();
         Ok(Self { haptics, warnings, driven: None, last: None })
     }
 

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     scene::{ContactLaw, Scene},
     store::space::MAX_LEVELS,
-    sweep::{Aim, BackendChoice, Bake, Shard, Sweep, SweepReport},
+    sweep::{Aim, BackendChoice, Bake, Shard, SweepReport},
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -92,7 +92,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             .with_extension("haptize"),
     };
     let earlier = output::check(&output, Content::Dataset, [arguments.scene.as_path()])?;
-    output::check(&Sweep::growing_of(&output), Content::Dataset, [])?;
     let scene = reach::complete(scene, arguments.backend, arguments.max_error.is_some())?;
     if let (Some(aim), Some(levels)) = (arguments.max_error, arguments.refine) {
         let goal = RefinementGoal { aim, levels, most: arguments.max_points, output: &output };

@@ -3,6 +3,7 @@
 use super::{
     Failure,
     bar::Bar,
+    guessed,
     output::{self, Content, Folder, Overwritten, Replaced},
     report::{self, Describe, Report, Text},
     tell, watch,
@@ -11,12 +12,12 @@ use crate::{
     Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
-        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Samples, gridize, gridize_remembering,
-        predict_histories,
+        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Reversals, Samples, gridize,
+        gridize_remembering, gridize_sliding, predict_histories,
         prediction::{Prediction, held_out, predict},
     },
     input,
-    logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
+    logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, draws, import, total_size},
     proxy::Chain,
     report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
@@ -37,6 +38,7 @@ Examples:
   haptize gridize sponge.csv --step 0.03
   haptize gridize sponge.csv --step 0.03 --held-out 0.1 --figures out
   haptize gridize log.mcap --topic /joint_states --step 0.03
+  haptize gridize --guess run1.csv                  writes run1.columns.toml: what each column seems to be
   haptize gridize run1.csv run2.csv --columns instrument.toml --step 0.02,0.02,0.01 --scene arm.toml")]
 pub struct Arguments {
     /// A log written by `haptize scan`, an MCAP file with joint states of a robot, or with --columns any tables of
@@ -44,7 +46,14 @@ pub struct Arguments {
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     /// Grid step (rad or m): one number, or one a joint, separated by commas.
-    #[arg(long, required = true, value_delimiter = ',', num_args = 1, value_name = "H", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        required_unless_present = "guess",
+        value_delimiter = ',',
+        num_args = 1,
+        value_name = "H",
+        allow_negative_numbers = true
+    )]
     step: Vec<f64>,
     /// The dataset to write; by default the first log's name in the current folder, ending in .haptize.
     #[arg(short, long)]
@@ -52,6 +61,10 @@ pub struct Arguments {
     /// A TOML file that maps columns to quantities (datasets/instrument.toml is an example).
     #[arg(long, value_name = "TOML")]
     columns: Option<PathBuf>,
+    /// Write a column mapping for the log, guessed from the names of its columns and their numbers, instead of a
+    /// dataset; -o names it.
+    #[arg(long, conflicts_with_all = ["columns", "topic", "scene", "held_out", "against", "figures"])]
+    guess: bool,
     /// The topic of joint states to read of an MCAP file; by default its only one.
     #[arg(long)]
     topic: Option<String>,
@@ -103,22 +116,32 @@ pub struct Source {
     left_out: usize,
     /// What tells how the object relaxes, where something does.
     past: Option<(Vec<ForceHistory>, Past)>,
-    /// Friction of the object, and the arm and its node that felt it.
-    friction: Option<(IdentifiedFriction, Chain, usize)>,
+    friction: Option<Sliding>,
+}
+
+/// What tells of the object's friction.
+enum Sliding {
+    /// Strokes of a scan: friction, and the arm and its node that felt it.
+    Node(IdentifiedFriction, Chain, usize),
+    /// A log that goes to and fro: its rows, the joint that leads, and the sides of the cells in which they are averaged.
+    Joints(Vec<ForceHistory>, usize, Vec<f64>),
 }
 
 impl Source {
     /// Gridizes the samples; the dataset says where they come from, and that it was made now. Where something tells how
     /// the object relaxes, its scene names it.
     pub fn gridize(&self, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), Failure> {
-        let (mut dataset, report) = match &self.past {
-            Some((histories, past)) => gridize_remembering(&self.samples, (histories, *past), options)?,
-            None => gridize(&self.samples, options)?,
+        let (mut dataset, report) = match (&self.past, &self.friction) {
+            (Some((histories, past)), _) => gridize_remembering(&self.samples, (histories, *past), options)?,
+            (None, Some(Sliding::Joints(histories, lead, cell))) => {
+                gridize_sliding(&self.samples.joints, &Reversals { histories, lead: *lead, cell }, options)?
+            }
+            _ => gridize(&self.samples, options)?,
         };
         dataset.scene.clone_from(&self.scene);
-        if let Some((friction, chain, node)) = &self.friction {
+        if let Some(Sliding::Node(friction, chain, node)) = &self.friction {
             add_slip(&mut dataset, chain, *node);
-            dataset.provenance.friction = Some(*friction);
+            dataset.provenance.friction = Some(friction.clone());
         }
         if !self.scene.is_empty() {
             dataset.scene += &identified(&dataset.provenance)?;
@@ -133,6 +156,9 @@ impl Source {
 
 /// Reads the logs and writes the dataset.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    if arguments.guess {
+        return guessed::run(&arguments.logs, arguments.output.as_deref());
+    }
     let started = Instant::now();
     let output = output(arguments)?;
     let inputs = arguments.logs.iter().chain(&arguments.against).chain(&arguments.columns).chain(&arguments.scene);
@@ -192,7 +218,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         held_out,
         against: against.transpose()?,
         relaxation: dataset.provenance.relaxation.clone(),
-        friction: dataset.provenance.friction,
+        friction: dataset.provenance.friction.clone(),
         history_misfit,
         folder: folder.map(|folder| folder.close(&figures)).transpose()?,
         figures: report::names(&figures),
@@ -260,6 +286,9 @@ fn identified(provenance: &Provenance) -> Result<String, std::fmt::Error> {
     if let Some(found) = &provenance.friction {
         text += "\n[haptics.friction]\n";
         toml_text::entry(&mut text, "coefficient", &significant(found.coefficient), "identified by haptize gridize")?;
+        if let Some(stiffness) = found.stiffness {
+            toml_text::entry(&mut text, "stiffness", &significant(stiffness), "likewise")?;
+        }
     }
     Ok(text)
 }
@@ -268,7 +297,7 @@ fn identified(provenance: &Provenance) -> Result<String, std::fmt::Error> {
 fn at_rest(dataset: &Dataset) -> Dataset {
     let fading = |relaxation: &IdentifiedRelaxation| relaxation.terms.iter().map(|[share, _]| share).sum::<f64>();
     let lasting = 1.0 - dataset.provenance.relaxation.as_ref().map_or(0.0, fading);
-    let torque = dataset.torque.iter().map(|torque| lasting * torque).collect();
+    let torque: Vec<f64> = dataset.torque.iter().map(|torque| lasting * torque).collect();
     Dataset::bare(dataset.grid.clone(), torque, dataset.status.to_vec())
 }
 
@@ -343,7 +372,7 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
     let chain = Chain::new(&scene.proxy);
     let friction = identify_friction(&log, &scene.scan, &chain);
     let node = scene.scan.plan.node(chain.nodes.len());
-    let friction = friction.map(|friction| (friction, chain, node));
+    let friction = friction.map(|friction| Sliding::Node(friction, chain, node));
     Ok(Source {
         samples: log.samples(),
         scene: log.header.scene,
@@ -365,8 +394,20 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let imported = import(mapping, logs, &mut progress);
     bar.finish();
     let Imported { samples, branches, histories, report } = imported?;
+    if draws(&samples) {
+        tell(format_args!(
+            "haptize: note: the torques draw the arm on where an object pushes it back: if they are the motors', say \
+             effort = \"motor\" in [torque] of the mapping, or --effort; if they hold the weight of the arm, take it off"
+        ));
+    }
     let left_out = report.dropped.iter().map(|dropped| dropped.rows as usize).sum();
     let names: Vec<String> = logs.iter().map(|log| log.display().to_string()).collect();
+    let (mut past, mut friction) = (None, None);
+    if mapping.torque.relaxes {
+        past = Some((histories, Past::Log));
+    } else if mapping.torque.friction {
+        friction = Some(Sliding::Joints(histories, mapping.lead(), mapping.torque.cell.clone()));
+    }
     Ok(Source {
         samples,
         scene: String::new(),
@@ -376,8 +417,8 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
         import: Some(report),
         branches: branches.map(|branches| (branches, mapping.lead())),
         left_out,
-        past: (!histories.is_empty()).then_some((histories, Past::Log)),
-        friction: None,
+        past,
+        friction,
     })
 }
 
@@ -411,8 +452,18 @@ impl Describe for IdentifiedRelaxation {
 
 impl Describe for IdentifiedFriction {
     fn describe(&self, text: &mut Text) {
-        let Self { coefficient, strokes, deviation } = self;
-        text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes to and fro"));
+        let Self { coefficient, strokes, deviation, stiffness, predicted } = self;
+        let builds_up = stiffness.map_or(String::new(), |k| format!(", builds up at {} N/m (N m/rad)", coarse(k)));
+        text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes{builds_up}"));
+        for (joint, [with, without]) in predicted.iter().enumerate() {
+            let joint = joint + 1;
+            text.row(
+                "",
+                format_args!(
+                    "joint {joint}: held-out strokes predicted to {with:.4} rms, without friction to {without:.4}"
+                ),
+            );
+        }
     }
 }
 

@@ -62,7 +62,7 @@ pub fn run(
     let (pilot, choice, sweep) = watch::watched(scene, backend, |bake| {
         tell(format_args!("haptize: pilot: coarse grids against random configurations ..."));
         let pilot = Pilot::run(scene, goal.aim, bake.backend, bake.stop)?;
-        let choice = pilot.choose(scene, goal.points, bake.backend)?;
+        let choice = pilot.choose(scene, goal.points)?;
         state(&pilot, &choice);
         let aim = Some(pilot.relative);
         let bake = Bake { scene: &choice.scene, measured: Some(MEASURED), aim, progress: &mut *bake.progress, ..bake };
@@ -90,11 +90,9 @@ fn state(pilot: &Pilot, choice: &Choice) {
         choice.interpolation,
         choice.tolerance,
     ));
-    let disk = choice.footprint.disk;
     tell(format_args!(
-        "haptize: predicted: about {:.0} s, {} to {} on the disk",
+        "haptize: predicted: about {:.0} s, {} on the disk",
         choice.seconds.ceil(),
-        watch::megabytes(disk.least),
-        watch::megabytes(disk.most),
+        watch::megabytes(choice.bytes as usize),
     ));
 }

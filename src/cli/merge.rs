@@ -9,7 +9,7 @@ use super::{
     report::{Describe, Report, Text},
     tell, watch,
 };
-use crate::sweep::{Merge, Merged, Progress, Sweep, ranges};
+use crate::sweep::{Merge, Merged, Progress, ranges};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -42,7 +42,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let output = &arguments.output;
     let inputs = arguments.parts.iter().map(PathBuf::as_path);
     let earlier = output::check(output, Content::Dataset, inputs)?;
-    output::check(&Sweep::growing_of(output), Content::Dataset, [])?;
     let merge = Merge::gather(&arguments.parts)?;
     merge.notes.iter().for_each(|note| tell(format_args!("haptize: {note}")));
     let missing = merge.missing();

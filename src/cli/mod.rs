@@ -33,6 +33,7 @@ mod device;
 mod doctor;
 mod export;
 mod gridize;
+mod guessed;
 mod import;
 mod info;
 mod inspect;

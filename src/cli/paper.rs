@@ -139,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         figures
             .sheet("fig9-side-press", &press::titled("Press on the side of the simulated block", scans.side.trace))?,
     );
-    files.extend(figures.sheet("torque", &slices(&dataset))?);
+    files.extend(figures.sheet("torque", &slices(&dataset, None))?);
     files.extend(figures.sheet("energy", &press::energy(&pressed))?);
     files.extend(figures.sheet("scrape", &press::titled("Scraping over the sphere", &scraped))?);
 

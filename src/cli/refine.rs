@@ -15,8 +15,8 @@ use crate::{
     scene::Scene,
     store::Store,
     sweep::{
-        Aim, BackendChoice, ChosenBackend, CpuBackend, Lowered, build_object, grid_of,
-        refine::{Judge, Refine},
+        Aim, BackendChoice, ChosenBackend, CpuBackend, Reference, build_object, grid_of,
+        refine::{Refine, Refined},
         sample,
     },
 };
@@ -43,11 +43,8 @@ pub struct RefinementGoal<'a> {
 #[derive(Serialize)]
 struct BakedStore {
     file: String,
-    /// Nodes, over all levels and of each.
-    nodes: usize,
-    by_level: Vec<usize>,
-    equilibria: usize,
-    solved: usize,
+    #[serde(flatten)]
+    refined: Refined,
     blocks: usize,
     /// Memory of the store, and its maximum as it was predicted (bytes).
     memory: usize,
@@ -57,12 +54,9 @@ struct BakedStore {
     aim: f64,
     /// Points of a uniform grid of the finest spacing.
     uniform: usize,
-    rounds: usize,
-    lowered: Option<Lowered>,
     backend: String,
     adapter: String,
     left_to_cpu: usize,
-    warnings: Vec<String>,
     kept: bool,
     /// Size of the file (bytes).
     bytes: usize,
@@ -76,7 +70,8 @@ struct BakedStore {
 
 impl Describe for BakedStore {
     fn describe(&self, text: &mut Text) {
-        let Self { file, nodes, by_level, equilibria, solved, uniform, rounds, backend, adapter, .. } = self;
+        let Self { file, refined, uniform, backend, adapter, .. } = self;
+        let Refined { nodes, by_level, equilibria, solved, rounds, lowered, .. } = refined;
         text.line(format_args!("{file}: {nodes} nodes, {by_level:?} by level, {:.1} s", self.seconds));
         describe_error(text, Some(&self.measured), Some(self.aim));
         text.row(
@@ -89,7 +84,7 @@ impl Describe for BakedStore {
             ),
         );
         describe_left_to_cpu(text, self.left_to_cpu);
-        self.lowered.describe(text);
+        lowered.describe(text);
         let [disk, memory] = [self.bytes, self.memory].map(megabytes);
         text.row("bytes", format_args!("{disk} on the disk, {memory} in memory"));
         if !self.kept {
@@ -114,16 +109,16 @@ pub fn run(
     model.with_tangent = true;
     model.with_slip = scene.haptics.uses_slip();
     let solving = Instant::now();
-    let seen = Judge::new(scene, &model, 1, JUDGED)?;
+    let seen = Reference::in_contact(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
-    let mut judges = [seen, Judge::new(scene, &model, 2, JUDGED)?];
-    let aim = aim.relative(judges[0].torque());
+    let mut judges = [seen, Reference::in_contact(scene, &model, 2, JUDGED)?];
+    let aim = aim.relative(judges[0].torque);
     let mut refine =
         Refine { model: &model, base: grid_of(scene), levels: goal.levels, aim, most: goal.most, batch: 1 };
     let most = uniform(&refine).min(refine.most);
     let mut backend = ChosenBackend::open(backend.for_work(each * most as f64), &model)?;
     refine.batch = backend.chunk();
-    let each = matches!(backend, ChosenBackend::Cpu(_)).then_some(each);
+    let each = backend.is_cpu_alone().then_some(each);
     let most_memory = announce(&refine, &judges[0], each);
     let refined = refine.fill(&mut judges, &mut backend)?;
     refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
@@ -140,22 +135,16 @@ pub fn run(
     refined.store.save(&refine.base, Some(&Surface::of(&object)), &scene.text, &provenance, goal.output)?;
     let baked = BakedStore {
         file: goal.output.display().to_string(),
-        nodes: refined.nodes,
-        by_level: refined.by_level,
-        equilibria: refined.equilibria,
-        solved: refined.solved,
+        refined,
         blocks,
         memory,
         most_memory,
         error: measured.relative(),
         aim,
         uniform: uniform(&refine),
-        rounds: refined.rounds,
-        lowered: refined.lowered,
         backend: provenance.backend,
         adapter: provenance.adapter,
         left_to_cpu: backend.left_to_cpu(),
-        warnings: refined.notices,
         kept,
         bytes: std::fs::metadata(goal.output)?.len() as usize,
         seconds: began.elapsed().as_secs_f64(),
@@ -172,7 +161,7 @@ fn uniform(refine: &Refine<'_>) -> usize {
 
 /// Prints what the filling is going to take, before it begins; `each` is the time of a node (s), where it is known.
 /// Returns the memory of the store at most (bytes).
-fn announce(refine: &Refine<'_>, judge: &Judge, each: Option<f64>) -> usize {
+fn announce(refine: &Refine<'_>, judge: &Reference, each: Option<f64>) -> usize {
     let (percent, uniform) = (100.0 * refine.aim, uniform(refine));
     tell(format_args!(
         "haptize: for an rms error of {percent:.2} %: {} points of the scene's grid, and of up to {uniform} where it \

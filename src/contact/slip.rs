@@ -16,7 +16,7 @@
 //! `B B^T`, by rounding or otherwise.
 
 use crate::{
-    JointMatrix,
+    JointMatrix, JointVector,
     joint_matrix::{self, add_symmetric},
     proxy::{Chain, Links},
 };
@@ -69,6 +69,14 @@ impl Slip {
     pub fn rate(&self, rates: &[f64]) -> f64 {
         let rows = self.jacobian.iter().take(rates.len());
         rows.map(|row| row.iter().zip(rates).map(|(b, rate)| b * rate).sum::<f64>().powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Returns `deflection + B way`: where a spring that slips along is after the joints went that `way` (m).
+    #[must_use]
+    pub fn deflected(&self, deflection: &JointVector, way: &JointVector) -> JointVector {
+        let mut end = *deflection;
+        end.iter_mut().zip(&self.jacobian).for_each(|(z, row)| *z += way.dot(row));
+        end
     }
 
     /// Returns N |B qdot| of joint rates `rates`: what friction of coefficient one takes at most (W).

@@ -44,14 +44,23 @@ pub struct IdentifiedRelaxation {
 }
 
 /// Friction of a measured object, identified from recorded strokes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IdentifiedFriction {
-    /// Tangential over normal force while slipping (1).
+    /// Tangential over normal force while slipping; one where the strokes were those of joints, whose friction the
+    /// dataset holds as normal force and slip (1).
     pub coefficient: f64,
-    /// Strokes to and fro that it is the mean of.
+    /// Strokes that it is the mean of.
     pub strokes: usize,
     /// Standard deviation from stroke to stroke (1).
     pub deviation: f64,
+    /// Stiffness with which it builds up where the motion turns; absent where that was not identified (N/m, or N m/rad
+    /// of joints).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<f64>,
+    /// Torque on every fourth stroke, predicted from the others less the measured one, rms, a joint each: with friction,
+    /// and without (N m or N). Empty where none was held out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub predicted: Vec<[f64; 2]>,
 }
 
 /// Difference of contact with the surface at rest from contact with the deformed surface.

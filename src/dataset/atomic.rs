@@ -6,7 +6,6 @@
 //! in that folder removes. A temporary file is locked as long as it is written, and the system unlocks it however a
 //! process ends.
 
-use super::claim;
 use std::{
     collections::BTreeSet,
     fs::{self, File},
@@ -14,38 +13,10 @@ use std::{
     path::{Path, PathBuf},
     sync::{Mutex, MutexGuard, Once, PoisonError},
 };
-use tempfile::{NamedTempFile, TempPath};
+use tempfile::NamedTempFile;
 
 /// Buffer between the writer and the file (bytes).
 pub(crate) const BUFFER: usize = 1 << 20;
-
-/// A file that is to appear.
-#[derive(Clone, Copy, Debug)]
-pub struct Target<'a> {
-    path: &'a Path,
-    growing: Option<&'a Path>,
-}
-
-impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Target<'a> {
-    fn from(path: &'a P) -> Self {
-        Self { path: path.as_ref(), growing: None }
-    }
-}
-
-impl<'a> Target<'a> {
-    /// The file is called `growing` until it is whole. Nobody else may write there meanwhile; a regular file that a
-    /// killed process has left there is removed.
-    #[must_use]
-    pub fn growing(path: &'a Path, growing: &'a Path) -> Self {
-        Self { path, growing: Some(growing) }
-    }
-
-    /// The file's path.
-    #[must_use]
-    pub fn path(&self) -> &'a Path {
-        self.path
-    }
-}
 
 /// Temporary files that are being written.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -78,7 +49,6 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 pub fn discard_unfinished() {
     static DONE: Once = Once::new();
     DONE.call_once(|| {
-        claim::discard();
         let unfinished = unfinished();
         for path in unfinished.iter() {
             // A file that has just taken its final name is no longer there.
@@ -105,16 +75,12 @@ pub fn resolved(path: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// Replaces the file `target` by what `write` writes. Unless the target says otherwise, it grows under a name that no
-/// other file has.
+/// Replaces the file at `path` by what `write` writes; until it is whole it has a name that no other file has.
 ///
 /// # Errors
 /// Returns the error of `write` or of the system; then the old file is untouched and the temporary one is gone.
-pub fn replace_file<'a>(
-    target: impl Into<Target<'a>>,
-    write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
-) -> io::Result<()> {
-    let replacement = Replacement::begin(target)?;
+pub fn replace_file(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> io::Result<()> {
+    let replacement = Replacement::begin(path)?;
     let mut writer = replacement.writer();
     write(&mut writer)?;
     writer.flush()?;
@@ -130,30 +96,19 @@ pub struct Replacement {
 }
 
 impl Replacement {
-    /// Makes the temporary file of `target`.
+    /// Makes the temporary file that is to replace the file at `path`.
     ///
     /// # Errors
     /// Those of the system, here and below; and where the file is there and may not be written to, though the system
     /// lets it be replaced.
-    pub fn begin<'a>(target: impl Into<Target<'a>>) -> io::Result<Self> {
-        let Target { path, growing } = target.into();
+    pub fn begin(path: &Path) -> io::Result<Self> {
         let path = resolved(path)?;
         if fs::metadata(&path).is_ok_and(|there| there.permissions().readonly()) {
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is there and may not be written to"));
         }
-        let (unfinished, temporary) = match growing {
-            Some(growing) => {
-                clear(growing)?;
-                let make =
-                    || Ok(NamedTempFile::from_parts(File::create_new(growing)?, TempPath::try_from_path(growing)?));
-                Unfinished::begin(make)?
-            }
-            None => {
-                let folder = folder(&path);
-                remove_abandoned(folder);
-                locked_in(folder)?
-            }
-        };
+        let folder = folder(&path);
+        remove_abandoned(folder);
+        let (unfinished, temporary) = locked_in(folder)?;
         // Before anything is written: nobody reads it who may not read the file that it replaces.
         #[cfg(unix)]
         take_over(&path, temporary.as_file());
@@ -192,7 +147,7 @@ fn take_over(path: &Path, file: &File) {
 }
 
 /// The folder of the file at `path`.
-pub(super) fn folder(path: &Path) -> &Path {
+fn folder(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -200,8 +155,8 @@ pub(super) fn folder(path: &Path) -> &Path {
 }
 
 /// How names of temporary files begin and end.
-pub(super) const PREFIX: &str = ".haptize-";
-pub(super) const SUFFIX: &str = ".tmp";
+const PREFIX: &str = ".haptize-";
+const SUFFIX: &str = ".tmp";
 
 /// Makes a temporary file in `folder`, locked so that no other process takes it for abandoned.
 fn locked_in(folder: &Path) -> io::Result<(Unfinished, NamedTempFile)> {
@@ -232,19 +187,6 @@ fn remove_abandoned(folder: &Path) {
                 let _ = fs::remove_file(entry.path());
             }
         }
-    }
-}
-
-/// Removes the regular file that a killed process has left at `path`. Through a link nothing is removed.
-fn clear(path: &Path) -> io::Result<()> {
-    match fs::symlink_metadata(path) {
-        Ok(there) if there.is_file() => fs::remove_file(path),
-        Ok(_) => {
-            let why = format!("{} is in the way and no regular file: move it away", path.display());
-            Err(io::Error::new(io::ErrorKind::InvalidInput, why))
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(error),
     }
 }
 
@@ -326,38 +268,6 @@ mod tests {
             assert!(replace_file(path, |w| w.write_all(b"new")).is_err(), "{}", path.display());
         }
         assert!(lost.is_symlink() && !Path::new("/dev/null").is_file());
-    }
-
-    #[test]
-    fn a_file_that_grows_under_a_given_name_overwrites_what_is_left_there() {
-        let folder = tempfile::tempdir().unwrap();
-        let (path, growing) = (folder.path().join("a.bin"), folder.path().join("a.bin.new"));
-        std::fs::write(&growing, b"left by a killed process").unwrap();
-        let target = Target::growing(&path, &growing);
-        let full = replace_file(target, |_| Err(io::Error::from(io::ErrorKind::StorageFull)));
-        assert_eq!(full.unwrap_err().kind(), io::ErrorKind::StorageFull);
-        assert!(names(folder.path()).is_empty());
-        std::fs::write(&growing, b"left by a killed process").unwrap();
-        replace_file(target, |w| {
-            assert_eq!(names(folder.path()), ["a.bin.new"]);
-            w.write_all(b"new")
-        })
-        .unwrap();
-        assert_eq!(std::fs::read(&path).unwrap(), b"new");
-        assert_eq!(names(folder.path()), ["a.bin"]);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_link_at_the_growing_name_is_no_way_to_another_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let [path, growing, other] = ["a.bin", "a.bin.new", "other"].map(|name| folder.path().join(name));
-        std::fs::write(&other, b"precious").unwrap();
-        std::os::unix::fs::symlink("other", &growing).unwrap();
-        let refused = replace_file(Target::growing(&path, &growing), |w| w.write_all(b"new")).unwrap_err();
-        assert!(refused.to_string().contains("move it away"), "{refused}");
-        assert_eq!(std::fs::read(&other).unwrap(), b"precious");
-        assert!(growing.is_symlink() && !path.exists());
     }
 
     #[test]

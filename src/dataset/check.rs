@@ -3,7 +3,7 @@
 //! Lengths fit the grid, contact rows are ordered and within, statuses are known, every number is finite. Checked in an
 //! order in which no check relies on one that comes later, and without allocating, so that hostile counts cost nothing.
 
-use super::{CONTACTS, Contacts, Dataset, Grid, Solid, Stored, Surface};
+use super::{Contacts, Dataset, Grid, Solid, Stored, Surface};
 use crate::contact::Status;
 use safetensors::Dtype;
 
@@ -29,8 +29,8 @@ pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
     }
     match (&dataset.contacts, &dataset.surface) {
         (Some(contacts), Some(surface)) => {
-            check_contacts(contacts, points, CONTACTS)?;
-            within(CONTACTS[1], &contacts.nodes, surface.nodes.len() / 3)
+            check_contacts(contacts, points)?;
+            within(Stored::ContactNodes, &contacts.nodes, surface.nodes.len() / 3)
         }
         (Some(_), None) => Err("contact forces name the nodes of a surface that is not there".into()),
         (None, _) => Ok(()),
@@ -52,11 +52,11 @@ fn check_surface(surface: &Surface) -> Result<(), String> {
     within(Stored::Tetrahedra, tetrahedra, (nodes.len() + inner_nodes.len()) / 3)
 }
 
-fn check_contacts(contacts: &Contacts, points: usize, [ends, at, on]: [Stored; 3]) -> Result<(), String> {
+fn check_contacts(contacts: &Contacts, points: usize) -> Result<(), String> {
     let Contacts { offsets, nodes, forces } = contacts;
-    exactly(ends, offsets.len(), points.checked_add(1).ok_or(TOO_MANY_POINTS)?)?;
-    exactly(on, forces.len(), nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
-    let (ends, at) = (ends.name(), at.name());
+    exactly(Stored::ContactOffsets, offsets.len(), points.checked_add(1).ok_or(TOO_MANY_POINTS)?)?;
+    exactly(Stored::ContactForces, forces.len(), nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
+    let (ends, at) = (Stored::ContactOffsets.name(), Stored::ContactNodes.name());
     if offsets[0] != 0 || offsets[points] != nodes.len() as u64 {
         return Err(format!("{ends} do not run from 0 to the {} contacts", nodes.len()));
     }

@@ -22,6 +22,11 @@ impl<T: Pod> Column<T> {
         Some(Self(Storage::Mapped { map, bytes }))
     }
 
+    /// The numbers as bytes.
+    pub(super) fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(self)
+    }
+
     /// Gives the memory of the whole mapped file back to the system, where that takes such advice: pages are read again
     /// from the file, or its cache, once they are looked at. The columns must lie in a file, not in a copy of one,
     /// which would be lost.

@@ -20,7 +20,7 @@
 //! of this crate never do that, they rename; the haptic loop reads through [`Dataset::load`], which copies.
 
 use super::{
-    BUFFER, Dataset, Grid, Provenance, Stored, Surface, Target, check,
+    BUFFER, Dataset, Grid, Provenance, Stored, Surface, check,
     error::{inconsistent, unwritable},
     replace_file, store,
     stored::Description,
@@ -195,19 +195,18 @@ pub(crate) fn check_place(path: &Path) -> Result<(), Error> {
 }
 
 impl Dataset {
-    /// Writes the dataset, replacing the file `target` whole or not at all.
+    /// Writes the dataset, replacing the file at `path` whole or not at all.
     ///
     /// # Errors
     /// When it would be refused on reading, a file of another kind is there, or the system refuses.
-    pub fn save<'a>(&self, target: impl Into<Target<'a>>) -> Result<(), Error> {
-        let target = target.into();
-        check_place(target.path())?;
-        check::check(self).map_err(|reason| inconsistent(target.path(), reason))?;
+    pub fn save(&self, path: &Path) -> Result<(), Error> {
+        check_place(path)?;
+        check::check(self).map_err(|reason| inconsistent(path, reason))?;
         let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };
         if let Some(store) = &self.refinement {
-            return store::file::save(store, heading, self.surface.as_ref(), target);
+            return store::file::save(store, heading, self.surface.as_ref(), path);
         }
-        write_file(target, heading, arrays(self).map(|(_, tensor)| tensor).collect())
+        write_file(path, heading, arrays(self).map(|(_, tensor)| tensor).collect())
     }
 }
 
@@ -228,23 +227,18 @@ pub(crate) struct Kind<'a> {
     pub(crate) store: Option<&'a str>,
 }
 
-/// Writes a dataset's file, replacing the one that is `target` whole or not at all. The tensors may be in any order.
-pub(crate) fn write_file<C: Contents>(
-    target: Target<'_>,
-    heading: Heading<'_>,
-    tensors: Vec<Tensor<C>>,
-) -> Result<(), Error> {
-    write_container(target, Kind { format: FORMAT, store: None }, heading, tensors)
+/// Writes a dataset's file, replacing the one at `path` whole or not at all. The tensors may be in any order.
+pub(crate) fn write_file<C: Contents>(path: &Path, heading: Heading<'_>, tensors: Vec<Tensor<C>>) -> Result<(), Error> {
+    write_container(path, Kind { format: FORMAT, store: None }, heading, tensors)
 }
 
 /// Writes a file of any kind in the dataset's container, as [`write_file`] does.
 pub(crate) fn write_container<C: Contents>(
-    target: Target<'_>,
+    path: &Path,
     kind: Kind<'_>,
     heading: Heading<'_>,
     mut tensors: Vec<Tensor<C>>,
 ) -> Result<(), Error> {
-    let path = target.path();
     let inconsistent = |reason: String| inconsistent(path, reason);
     tensors.sort_by_key(|tensor| std::cmp::Reverse(tensor.dtype.bitsize()));
     let mut text = header(kind, heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
@@ -252,7 +246,7 @@ pub(crate) fn write_container<C: Contents>(
     if text.len() > MAX_HEADER {
         return Err(inconsistent(format!("its header, scene included, is longer than {MAX_HEADER} bytes")));
     }
-    replace_file(target, |writer| {
+    replace_file(path, |writer| {
         let mut hasher = crc32fast::Hasher::new();
         for bytes in [&(text.len() as u64).to_le_bytes()[..], &text] {
             writer.write_all(bytes)?;

@@ -9,7 +9,6 @@ mod accuracy;
 mod agreement;
 mod atomic;
 mod check;
-mod claim;
 mod column;
 mod error;
 mod export;
@@ -27,17 +26,16 @@ pub use accuracy::{
     FrictionExcess, GeometryError, IdentifiedFriction, IdentifiedRelaxation, InterpolationError, MeasuredError,
 };
 pub(crate) use atomic::BUFFER;
-pub use atomic::{Replacement, Target, discard_unfinished, replace_file, resolved};
-pub use claim::Claim;
+pub use atomic::{Replacement, discard_unfinished, replace_file, resolved};
 pub use column::Column;
 pub use export::Format;
 pub(crate) use file::{
-    Contents as TensorContents, Heading, Kind, PIECE_BUFFER, Tensor, check_place, may_be_dataset, surface_tensors,
-    write_container, write_file,
+    Contents as TensorContents, Element, Heading, Kind, PIECE_BUFFER, Tensor, check_place, may_be_dataset,
+    surface_tensors, write_container, write_file,
 };
 pub use grid::{Axis, Grid, JointLabel};
 pub use stencil::Stencil;
-pub(crate) use stored::{Axes, CONTACTS, RESULTS, Stored};
+pub(crate) use stored::{Extras, RESULTS, Source, Stored};
 pub use summary::{Refinement, StatusCounts, Summary};
 
 use crate::contact::{MeshRipple, NodeForce, Status};
@@ -161,7 +159,7 @@ pub struct Provenance {
 impl Dataset {
     /// Torque and status at every point of `grid`, and nothing else: no energy, no contacts, no surface, no scene.
     #[must_use]
-    pub fn bare(grid: Grid, torque: Vec<f64>, status: Vec<u8>) -> Self {
+    pub fn bare(grid: Grid, torque: impl Into<Column<f64>>, status: impl Into<Column<u8>>) -> Self {
         Self {
             grid,
             torque: torque.into(),

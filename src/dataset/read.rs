@@ -1,7 +1,7 @@
 //! Dataset files, read: mapped or copied, checked as a whole, and cut into columns where they lie.
 
 use super::{
-    CONTACTS, Column, Contacts, Dataset, Grid, Provenance, SlipColumns, Solid, Stored, Surface, check,
+    Column, Dataset, Grid, Provenance, Source, Stored, Surface, check,
     error::{damaged, foreign, no_memory},
     file::{CHECKSUM, Element, FORMAT, LENGTH, MAX_HEADER, NO_CHECKSUM, OPENING, PAGE, digits},
     store,
@@ -83,7 +83,8 @@ fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
                     damping; leave contact_damping out of its scene and bake it again";
         return Err(Error::at(path, what).of(ErrorKind::Dataset));
     }
-    let dataset = windows.dataset(tensors, grid, scene, provenance).map_err(damaged)?;
+    let mut arrays = Arrays { windows, tensors, grid: &grid };
+    let dataset = Dataset { scene, provenance, ..Dataset::of(&mut arrays, grid.clone()).map_err(damaged)? };
     container.finish().map_err(damaged)?;
     check::check(&dataset).map_err(damaged)?;
     Ok(dataset)
@@ -159,7 +160,7 @@ impl Container {
 
     /// Takes the tensor `name`; `shape` leaves free lengths as `None`. `Err` says what is wrong, or that it is missing.
     pub(crate) fn take<T: Element>(&mut self, name: &str, shape: &[Option<usize>]) -> Result<Column<T>, String> {
-        self.optional(name, shape)?.ok_or_else(|| missing(name))
+        self.optional(name, shape)?.ok_or_else(|| format!("tensor {name} is missing"))
     }
 
     /// The same; `None` where it is missing.
@@ -173,7 +174,7 @@ impl Container {
 
     /// Takes the object's geometry; `None` where it is absent. `Err` says what is wrong.
     pub(super) fn surface(&mut self, grid: &Grid) -> Result<Option<Surface>, String> {
-        Arrays { windows: &self.windows, tensors: &mut self.tensors, grid }.surface()
+        Surface::of_arrays(&mut Arrays { windows: &self.windows, tensors: &mut self.tensors, grid })
     }
 
     /// `Err` names a tensor that has not been taken.
@@ -191,32 +192,6 @@ struct Windows {
 }
 
 impl Windows {
-    fn dataset(
-        &self,
-        tensors: &mut BTreeMap<String, TensorInfo>,
-        grid: Grid,
-        scene: String,
-        provenance: Provenance,
-    ) -> Result<Dataset, String> {
-        let mut file = Arrays { windows: self, tensors, grid: &grid };
-        Ok(Dataset {
-            torque: file.required(Stored::Torque)?,
-            energy: file.optional(Stored::Energy)?,
-            tangent: file.optional(Stored::Tangent)?,
-            gap: file.optional(Stored::Gap)?,
-            status: file.required(Stored::Status)?,
-            residual: file.optional(Stored::Residual)?,
-            iterations: file.optional(Stored::Iterations)?,
-            contacts: file.contacts(CONTACTS)?,
-            slip: file.slip()?,
-            surface: file.surface()?,
-            refinement: None,
-            grid,
-            scene,
-            provenance,
-        })
-    }
-
     /// Takes the tensor `name` out of `tensors`; `None` where it is absent. `shape` leaves free lengths as `None`.
     fn column<T: Element>(
         &self,
@@ -244,45 +219,8 @@ struct Arrays<'a> {
     grid: &'a Grid,
 }
 
-impl Arrays<'_> {
-    /// `None` where it is absent.
-    fn optional<T: Element>(&mut self, array: Stored) -> Result<Option<Column<T>>, String> {
+impl Source for Arrays<'_> {
+    fn take<T: Element>(&mut self, array: Stored) -> Result<Option<Column<T>>, String> {
         self.windows.column(self.tensors, array.name(), &array.shape(self.grid))
     }
-
-    fn required<T: Element>(&mut self, array: Stored) -> Result<Column<T>, String> {
-        self.optional(array)?.ok_or_else(|| missing(array.name()))
-    }
-
-    /// The object's geometry; `None` where it is absent.
-    fn surface(&mut self) -> Result<Option<Surface>, String> {
-        let Some(nodes) = self.optional(Stored::SurfaceNodes)? else { return Ok(None) };
-        let triangles = self.required(Stored::SurfaceTriangles)?;
-        let solid = match self.optional(Stored::Tetrahedra)? {
-            None => None,
-            Some(tetrahedra) => Some(Solid {
-                inner_nodes: self.required(Stored::InnerNodes)?,
-                tetrahedra,
-                mid_nodes: self.optional(Stored::MidNodes)?.unwrap_or_else(|| Vec::new().into()),
-                regions: self.optional(Stored::Regions)?.unwrap_or_else(|| Vec::new().into()),
-            }),
-        };
-        Ok(Some(Surface { nodes, triangles, solid }))
-    }
-
-    /// The slip of the contacts; `None` where it is absent.
-    fn slip(&mut self) -> Result<Option<SlipColumns>, String> {
-        let Some(normal_force) = self.optional(Stored::NormalForce)? else { return Ok(None) };
-        Ok(Some(SlipColumns { normal_force, jacobian: self.required(Stored::SlipJacobian)? }))
-    }
-
-    /// Contact forces; `None` where they are absent.
-    fn contacts(&mut self, [offsets, nodes, forces]: [Stored; 3]) -> Result<Option<Contacts>, String> {
-        let Some(offsets) = self.optional(offsets)? else { return Ok(None) };
-        Ok(Some(Contacts { offsets, nodes: self.required(nodes)?, forces: self.required(forces)? }))
-    }
-}
-
-fn missing(name: &str) -> String {
-    format!("tensor {name} is missing")
 }

@@ -1,9 +1,10 @@
 //! What a dataset stores: each array's name, numbers, axes, unit and meaning, said once. The writer, the reader, the
 //! checks and the exports go through this table, and [docs/dataset.md](../../docs/dataset.md) is held against it.
 
-use super::{Axis, Contacts, Dataset, Grid, Solid, Surface};
+use super::{Axis, Column, Contacts, Dataset, Grid, SlipColumns, Solid, Surface, file::Element};
 use crate::joint_matrix;
 use safetensors::Dtype;
+use serde::{Deserialize, Serialize};
 
 /// An array of a dataset, in the order of a file among those of numbers of the same size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,9 +34,6 @@ use Stored::{
     Residual, SlipJacobian, Status, SurfaceNodes, SurfaceTriangles, Tangent, Tetrahedra, Torque,
 };
 
-/// Arrays of the contact forces on the object: ends of the rows, nodes and forces.
-pub(crate) const CONTACTS: [Stored; 3] = [ContactOffsets, ContactNodes, ContactForces];
-
 /// What an array is.
 pub(crate) struct Description {
     array: Stored,
@@ -43,8 +41,41 @@ pub(crate) struct Description {
     pub dtype: Dtype,
     pub axes: Axes,
     pub unit: Unit,
+    /// What a sweep stores it for; `None` where it always does.
+    pub extra: Option<Extra>,
     /// What a dataset without it lacks, in words, where that is worth saying.
     pub absent: Option<&'static str>,
+}
+
+/// What a sweep stores some arrays for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Extra {
+    /// Interpolation by tangents.
+    Tangent,
+    /// Friction.
+    Slip,
+    /// Contact forces on the object's nodes.
+    Forces,
+}
+
+/// Which of them a sweep stores arrays for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Extras {
+    pub tangent: bool,
+    pub slip: bool,
+    pub forces: bool,
+}
+
+impl Extras {
+    /// Whether an array is stored.
+    pub fn store(self, array: Stored) -> bool {
+        match array.description().extra {
+            None => true,
+            Some(Extra::Tangent) => self.tangent,
+            Some(Extra::Slip) => self.slip,
+            Some(Extra::Forces) => self.forces,
+        }
+    }
 }
 
 /// The arrays that a sweep makes, point by point.
@@ -93,16 +124,18 @@ const NODE: &[(&str, usize)] = &[("node", 0), ("xyz", 3)];
 const DESCRIPTIONS: [Description; 18] = [
     of(Torque, "torque", Dtype::F64, Axes::Joints("joint"), Unit::Effort),
     of(Energy, "energy", Dtype::F64, Axes::Grid, Unit::Of("J")).or_absent("stored energy"),
-    of(Tangent, "tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness),
-    of(NormalForce, "normal_force", Dtype::F32, Axes::Grid, Unit::Of("N")),
-    of(SlipJacobian, "slip_jacobian", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Slip),
+    of(Tangent, "tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness).with(Extra::Tangent),
+    of(NormalForce, "normal_force", Dtype::F32, Axes::Grid, Unit::Of("N")).with(Extra::Slip),
+    of(SlipJacobian, "slip_jacobian", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Slip).with(Extra::Slip),
     of(Gap, "gap", Dtype::F32, Axes::Grid, Unit::Of("m")).or_absent("gap"),
     of(Status, "status", Dtype::U8, Axes::Grid, Unit::Of("1")),
     of(Residual, "residual", Dtype::F32, Axes::Grid, Unit::Of("1")).or_absent("residuals"),
     of(Iterations, "iterations", Dtype::U32, Axes::Grid, Unit::Of("1")),
-    of(ContactOffsets, "contact_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1")).or_absent("contact forces"),
-    of(ContactNodes, "contact_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")),
-    of(ContactForces, "contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")),
+    of(ContactOffsets, "contact_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1"))
+        .with(Extra::Forces)
+        .or_absent("contact forces"),
+    of(ContactNodes, "contact_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")).with(Extra::Forces),
+    of(ContactForces, "contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")).with(Extra::Forces),
     of(SurfaceNodes, "surface_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")).or_absent("the object's surface"),
     of(SurfaceTriangles, "surface_triangles", Dtype::U32, Axes::Own(&[("triangle", 0), ("corner", 3)]), Unit::Of("1")),
     of(InnerNodes, "inner_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")),
@@ -112,10 +145,14 @@ const DESCRIPTIONS: [Description; 18] = [
 ];
 
 const fn of(array: Stored, name: &'static str, dtype: Dtype, axes: Axes, unit: Unit) -> Description {
-    Description { array, name, dtype, axes, unit, absent: None }
+    Description { array, name, dtype, axes, unit, extra: None, absent: None }
 }
 
 impl Description {
+    const fn with(self, extra: Extra) -> Self {
+        Self { extra: Some(extra), ..self }
+    }
+
     const fn or_absent(self, absent: &'static str) -> Self {
         Self { absent: Some(absent), ..self }
     }
@@ -125,6 +162,21 @@ impl Stored {
     /// All of them, in the order of a file.
     pub fn all() -> impl Iterator<Item = Self> {
         DESCRIPTIONS.iter().map(|description| description.array)
+    }
+
+    /// Numbers of an entry, of a point or of a row along its first axis, over so many joints.
+    pub fn numbers(self, joints: usize) -> usize {
+        match self.description().axes {
+            Axes::Grid => 1,
+            Axes::Joints(_) => joints,
+            Axes::Triangle(_) => joint_matrix::entries(joints),
+            Axes::Own(axes) => axes.iter().skip(1).map(|(_, length)| length).product(),
+        }
+    }
+
+    /// Bytes of an entry, as [`Stored::numbers`].
+    pub fn bytes(self, joints: usize) -> usize {
+        self.numbers(joints) * self.description().dtype.bitsize() / 8
     }
 
     /// Whether it has an entry for each contact, in rows that end at [`ContactOffsets`].
@@ -145,8 +197,7 @@ impl Stored {
         let over_grid = |last: Option<usize>| grid.counts().into_iter().chain(last).map(Some).collect();
         match self.description().axes {
             Axes::Grid => over_grid(None),
-            Axes::Joints(_) => over_grid(Some(grid.joints())),
-            Axes::Triangle(_) => over_grid(Some(joint_matrix::entries(grid.joints()))),
+            Axes::Joints(_) | Axes::Triangle(_) => over_grid(Some(self.numbers(grid.joints()))),
             Axes::Own(axes) => axes.iter().enumerate().map(|(k, (_, length))| (k > 0).then_some(*length)).collect(),
         }
     }
@@ -180,20 +231,56 @@ pub(super) fn units(grid: &Grid, unit: impl Fn(&Axis) -> String) -> String {
     units.join(", ")
 }
 
+/// Where the arrays of a dataset come from.
+pub(crate) trait Source {
+    /// Takes an array; `None` where it is absent. `Err` says what is wrong.
+    fn take<T: Element>(&mut self, array: Stored) -> Result<Option<Column<T>>, String>;
+
+    /// Takes an array that has to be there.
+    fn required<T: Element>(&mut self, array: Stored) -> Result<Column<T>, String> {
+        self.take(array)?.ok_or_else(|| format!("tensor {} is missing", array.name()))
+    }
+}
+
 impl Dataset {
+    /// The dataset over `grid` that `source` has the arrays of. `Err` says what is wrong.
+    pub(crate) fn of(source: &mut impl Source, grid: Grid) -> Result<Self, String> {
+        let contacts = source.take(ContactOffsets)?.map(|offsets| -> Result<_, String> {
+            Ok(Contacts { offsets, nodes: source.required(ContactNodes)?, forces: source.required(ContactForces)? })
+        });
+        let contacts = contacts.transpose()?;
+        let slip = source.take(NormalForce)?.map(|normal_force| -> Result<_, String> {
+            Ok(SlipColumns { normal_force, jacobian: source.required(SlipJacobian)? })
+        });
+        Ok(Self {
+            slip: slip.transpose()?,
+            contacts,
+            energy: source.take(Energy)?,
+            tangent: source.take(Tangent)?,
+            gap: source.take(Gap)?,
+            residual: source.take(Residual)?,
+            iterations: source.take(Iterations)?,
+            surface: Surface::of_arrays(source)?,
+            ..Self::bare(grid, source.required(Torque)?, source.required(Status)?)
+        })
+    }
+
     /// The numbers of an array as bytes; `None` where it is absent.
     pub(super) fn stored(&self, array: Stored) -> Option<&[u8]> {
+        let (contacts, slip) = (self.contacts.as_ref(), self.slip.as_ref());
         match array {
-            Torque => Some(bytemuck::cast_slice(&self.torque)),
-            Energy => self.energy.as_deref().map(bytemuck::cast_slice),
-            Tangent => self.tangent.as_deref().map(bytemuck::cast_slice),
-            NormalForce => Some(bytemuck::cast_slice(&self.slip.as_ref()?.normal_force)),
-            SlipJacobian => Some(bytemuck::cast_slice(&self.slip.as_ref()?.jacobian)),
-            Gap => self.gap.as_deref().map(bytemuck::cast_slice),
-            Status => Some(&self.status),
-            Residual => self.residual.as_deref().map(bytemuck::cast_slice),
-            Iterations => self.iterations.as_deref().map(bytemuck::cast_slice),
-            ContactOffsets | ContactNodes | ContactForces => self.contacts.as_ref()?.stored(array),
+            Torque => Some(self.torque.bytes()),
+            Energy => self.energy.as_ref().map(Column::bytes),
+            Tangent => self.tangent.as_ref().map(Column::bytes),
+            NormalForce => slip.map(|slip| slip.normal_force.bytes()),
+            SlipJacobian => slip.map(|slip| slip.jacobian.bytes()),
+            Gap => self.gap.as_ref().map(Column::bytes),
+            Status => Some(self.status.bytes()),
+            Residual => self.residual.as_ref().map(Column::bytes),
+            Iterations => self.iterations.as_ref().map(Column::bytes),
+            ContactOffsets => contacts.map(|contacts| contacts.offsets.bytes()),
+            ContactNodes => contacts.map(|contacts| contacts.nodes.bytes()),
+            ContactForces => contacts.map(|contacts| contacts.forces.bytes()),
             SurfaceNodes | SurfaceTriangles | InnerNodes | Tetrahedra | MidNodes | Regions => {
                 self.surface.as_ref()?.stored(array)
             }
@@ -209,32 +296,32 @@ impl Dataset {
     }
 }
 
-impl Contacts {
-    fn stored(&self, array: Stored) -> Option<&[u8]> {
-        match array {
-            ContactOffsets => Some(bytemuck::cast_slice(&self.offsets)),
-            ContactNodes => Some(bytemuck::cast_slice(&self.nodes)),
-            ContactForces => Some(bytemuck::cast_slice(&self.forces)),
-            _ => None,
-        }
-    }
-}
-
 impl Surface {
+    /// The geometry that `source` has the arrays of; `None` where it is absent. `Err` says what is wrong.
+    pub(super) fn of_arrays(source: &mut impl Source) -> Result<Option<Self>, String> {
+        let Some(nodes) = source.take(SurfaceNodes)? else { return Ok(None) };
+        let triangles = source.required(SurfaceTriangles)?;
+        let solid = source.take(Tetrahedra)?.map(|tetrahedra| -> Result<_, String> {
+            Ok(Solid {
+                inner_nodes: source.required(InnerNodes)?,
+                tetrahedra,
+                mid_nodes: source.take(MidNodes)?.unwrap_or_else(|| Vec::new().into()),
+                regions: source.take(Regions)?.unwrap_or_else(|| Vec::new().into()),
+            })
+        });
+        Ok(Some(Self { nodes, triangles, solid: solid.transpose()? }))
+    }
+
     /// As [`Dataset::stored`].
     pub(super) fn stored(&self, array: Stored) -> Option<&[u8]> {
         let solid = self.solid.as_ref();
         match array {
-            SurfaceNodes => Some(bytemuck::cast_slice(&self.nodes)),
-            SurfaceTriangles => Some(bytemuck::cast_slice(&self.triangles)),
-            InnerNodes => solid.map(|Solid { inner_nodes, .. }| bytemuck::cast_slice(inner_nodes)),
-            Tetrahedra => solid.map(|Solid { tetrahedra, .. }| bytemuck::cast_slice(tetrahedra)),
-            MidNodes => {
-                solid.filter(|solid| !solid.mid_nodes.is_empty()).map(|solid| bytemuck::cast_slice(&solid.mid_nodes))
-            }
-            Regions => {
-                solid.filter(|solid| !solid.regions.is_empty()).map(|solid| bytemuck::cast_slice(&solid.regions))
-            }
+            SurfaceNodes => Some(self.nodes.bytes()),
+            SurfaceTriangles => Some(self.triangles.bytes()),
+            InnerNodes => solid.map(|solid| solid.inner_nodes.bytes()),
+            Tetrahedra => solid.map(|solid| solid.tetrahedra.bytes()),
+            MidNodes => solid.map(|solid| solid.mid_nodes.bytes()).filter(|bytes| !bytes.is_empty()),
+            Regions => solid.map(|solid| solid.regions.bytes()).filter(|bytes| !bytes.is_empty()),
             _ => None,
         }
     }

@@ -8,7 +8,8 @@ use super::{
     colour::{Colour, WHITE},
     font,
 };
-use std::fmt::Write as _;
+use crate::{Error, error};
+use std::fmt::{Display, Write as _};
 use tiny_skia::{FillRule, LineCap, LineJoin, Mask, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
 pub use font::Weight;
@@ -78,16 +79,9 @@ impl TextStyle {
     }
 }
 
-/// A sheet could not be made into a picture.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot rasterise a figure of {width} x {height} pixels: {reason}; ask for a smaller scale")]
-pub struct PictureError {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// The rasteriser's message.
-    pub reason: String,
+/// The error of a sheet of so many pixels across and down that could not be made into a picture.
+fn not_rasterised([width, height]: [u32; 2], why: impl Display) -> Error {
+    error!("cannot rasterise a figure of {width} x {height} pixels: {why}; ask for a smaller scale")
 }
 
 /// A picture made of pixels, rows from the top.
@@ -216,14 +210,11 @@ impl Canvas {
     /// The sheet as pixels, `scale` pixels a point.
     ///
     /// # Errors
-    /// [`PictureError`] when the sheet has no area or is too large for memory.
-    pub fn pixels(&self, scale: f64) -> Result<Picture, PictureError> {
+    /// When the sheet has no area or is too large for memory.
+    pub fn pixels(&self, scale: f64) -> Result<Picture, Error> {
         let [width, height] = [self.width, self.height].map(|side| (side * scale).ceil().clamp(0.0, 1e6) as u32);
-        let mut sheet = Pixmap::new(width, height).ok_or_else(|| PictureError {
-            width,
-            height,
-            reason: "it has no area or does not fit into memory".to_owned(),
-        })?;
+        let mut sheet = Pixmap::new(width, height)
+            .ok_or_else(|| not_rasterised([width, height], "it has no area or does not fit into memory"))?;
         sheet.fill(tiny_skia::Color::WHITE);
         for (x, y, picture) in &self.pictures {
             let corner = [x * scale, y * scale].map(|coordinate| coordinate.round() as i64);
@@ -395,12 +386,12 @@ impl Picture {
     /// The picture as a PNG file.
     ///
     /// # Errors
-    /// [`PictureError`] when the encoder refuses it.
-    pub fn png(&self) -> Result<Vec<u8>, PictureError> {
+    /// When the encoder refuses it.
+    pub fn png(&self) -> Result<Vec<u8>, Error> {
         let [width, height] = [self.width as u32, self.height as u32];
         let mut bytes = Vec::new();
         encode_png(&mut bytes, [width, height], png::ColorType::Rgb, self.pixels.as_flattened())
-            .map_err(|error| PictureError { width, height, reason: error.to_string() })?;
+            .map_err(|error| not_rasterised([width, height], error))?;
         Ok(bytes)
     }
 }

@@ -66,10 +66,12 @@ impl GridSlips {
         for point in 0..count {
             let (energy, force) = (data.energy(point)?, slip.normal_force[point]);
             plausible("normal force", point, force.into())?;
-            if data.points[point].in_contact && energy > LEAST_ENERGY && force > 0.0 {
+            // Without a potential the dataset may have no energy.
+            let root = if is_potential { (2.0 * energy).sqrt() } else { 1.0 };
+            if data.points[point].in_contact && (!is_potential || energy > LEAST_ENERGY) && force > 0.0 {
                 known[point] = true;
                 let record = &mut records[point * wide..(point + 1) * wide];
-                record[0] = (f64::from(force) / (2.0 * energy).sqrt()) as f32;
+                record[0] = (f64::from(force) / root) as f32;
                 record[1..].copy_from_slice(&slip.jacobian[point * entries..(point + 1) * entries]);
             }
         }

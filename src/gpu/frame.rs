@@ -135,6 +135,21 @@ impl FrameUpdate {
         method: FrameMethod,
         effects: &GraphicsEffects,
     ) -> Result<Self, Error> {
+        Self::remembering(context, object, period, method, effects, false)
+    }
+
+    /// As [`FrameUpdate::new`]; `remembers`: a body force of the object's past acts beside the contact forces.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn remembering(
+        context: Arc<Context>,
+        object: &Object,
+        period: f64,
+        method: FrameMethod,
+        effects: &GraphicsEffects,
+        remembers: bool,
+    ) -> Result<Self, Error> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(error!("the time between frames is {period} s; it must be a positive number"));
         }
@@ -144,7 +159,7 @@ impl FrameUpdate {
         let start = start(object, &weight, stiffening.as_ref(), effects)?;
         let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
         let gpu = context.as_ref();
-        let common = Common::new(gpu, object, stiffness, (period, effects), &start, !weight.is_empty())?;
+        let common = Common::new(gpu, object, stiffness, (period, effects), &start, !weight.is_empty() || remembers)?;
         let mut stages = Vec::new();
         let mut buffers = common.sizes();
         if let (Some(stiffening), Some(loads), Some(spec)) = (&stiffening, &common.loads, effects.stiffening) {
@@ -204,13 +219,22 @@ impl FrameUpdate {
     /// # Errors
     /// When the device has failed.
     pub fn step(&mut self, forces: &[DVec3]) -> Result<(), GpuError> {
+        self.step_remembering(forces, &[])
+    }
+
+    /// As [`FrameUpdate::step`], with the body force `past` beside the forces of `contact`.
+    ///
+    /// # Errors
+    /// When the device has failed.
+    pub fn step_remembering(&mut self, contact: &[DVec3], past: &[DVec3]) -> Result<(), GpuError> {
         let padded = |force: DVec3| force.as_vec3().extend(0.0).to_array();
         self.padded.clear();
-        self.padded.extend(forces.iter().map(|force| padded(*force)));
+        self.padded.extend(contact.iter().map(|force| padded(*force)));
         self.padded.resize(self.attachment.rows(), [0.0; 4]);
         self.forces.write(&self.context, &self.padded);
         if let Some(loads) = &self.loads {
-            self.attachment.spread(forces, &mut self.acting);
+            self.attachment.spread(contact, &mut self.acting);
+            self.attachment.add(past, &mut self.acting);
             self.acting.iter_mut().zip(&self.weight).for_each(|(force, weight)| *force += *weight);
             self.padded.clear();
             self.padded.extend(self.acting.iter().map(|force| padded(*force)));

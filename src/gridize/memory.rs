@@ -7,19 +7,18 @@
 //! memory left of it, gridized again, and so on until the terms stay.
 
 use super::{
-    GridizeOptions, GridizeReport, Samples,
+    Branches, Cells, GridizeOptions, GridizeReport, LeadDirection, Samples,
     energy::energy,
     gridize,
     relaxation::{Identified, Stretch, identify},
 };
 use crate::{
-    Error, JointVector, MAX_AXES,
+    Error, JointVector,
     dataset::{Dataset, IdentifiedRelaxation, JointLabel},
     error,
     field::{Flags, TorqueField},
     scene::{Interpolation, MOST_TERMS, THRESHOLD},
 };
-use std::collections::BTreeMap;
 
 /// What is wrong with histories of which nothing can be compared.
 const NO_HISTORY: &str = "no history has rows that count inside the grid: take a smaller step, so that it reaches \
@@ -49,6 +48,24 @@ pub struct ForceHistory {
     pub torques: Vec<f64>,
     /// Whether each row counts: held by a device whose own inertia and friction are not in it.
     pub counts: Vec<bool>,
+    /// Where the lead joint goes in each row, where it moves; empty where none leads.
+    pub directions: Vec<Option<LeadDirection>>,
+}
+
+impl ForceHistory {
+    /// Adds a row that counts.
+    pub fn push(&mut self, time: f64, q: &[f64], torque: &[f64], direction: Option<LeadDirection>) {
+        self.times.push(time);
+        self.configurations.extend_from_slice(q);
+        self.torques.extend_from_slice(torque);
+        self.counts.push(true);
+        self.directions.push(direction);
+    }
+
+    /// Configuration and torque of row `row`, of `joints` numbers each.
+    pub(super) fn row(&self, row: usize, joints: usize) -> [JointVector; 2] {
+        [&self.configurations, &self.torques].map(|all| JointVector::from_slice(&all[row * joints..(row + 1) * joints]))
+    }
 }
 
 /// What tells of the object's memory.
@@ -154,32 +171,20 @@ fn stretches(dataset: &Dataset, histories: &[ForceHistory]) -> Result<Vec<Stretc
 /// One sample for each cell of the grid that a history goes through: the mean torque without memory, which left the
 /// share `left` of each row, weighted by that share's square as noise is.
 fn fresh(joints: &[JointLabel], histories: &[ForceHistory], left: &[Vec<f64>], steps: &[f64]) -> Samples {
-    let count = joints.len();
-    let mut cells: BTreeMap<[i64; MAX_AXES], (f64, Vec<f64>)> = BTreeMap::new();
+    let sides: Vec<f64> = steps.iter().cycle().take(joints.len()).copied().collect();
+    let mut cells = Cells::new(&sides);
     for (number, history) in histories.iter().enumerate() {
-        let rows = history.configurations.chunks_exact(count).zip(history.torques.chunks_exact(count));
-        for (row, (q, torque)) in rows.enumerate() {
+        for row in 0..history.times.len() {
             let left = left.get(number).map_or(1.0, |left| left[row]);
-            if left < LEAST_LEFT {
-                continue;
+            if left >= LEAST_LEFT {
+                let [q, mut torque] = history.row(row, joints.len());
+                torque.iter_mut().for_each(|tau| *tau /= left);
+                cells.add_alone(&q, &torque, left * left);
             }
-            let mut cell = [0; MAX_AXES];
-            cell.iter_mut().zip(q).enumerate().for_each(|(joint, (cell, q))| {
-                *cell = (q / steps[joint % steps.len()]).floor() as i64;
-            });
-            let weight = left * left;
-            let (sum, means) = cells.entry(cell).or_insert_with(|| (0.0, vec![0.0; 2 * count]));
-            *sum += weight;
-            let values = q.iter().copied().chain(torque.iter().map(|tau| tau / left));
-            means.iter_mut().zip(values).for_each(|(mean, value)| *mean += weight / *sum * (value - *mean));
         }
     }
-    let mut samples = Samples { joints: joints.to_vec(), ..Samples::default() };
-    for (_, means) in cells.into_values() {
-        samples.configurations.extend_from_slice(&means[..count]);
-        samples.torques.extend_from_slice(&means[count..]);
-    }
-    samples
+    // How far rows of a cell are apart is how the torque changes across it, not noise.
+    Samples { deviations: None, ..cells.samples(Branches::Any, joints) }
 }
 
 /// Predicted less measured over measured torque, rms over all rows that count (1); `scaled`: each stretch by the factor

@@ -10,12 +10,16 @@
 //! The contact index of a grid point is the paper's (section 3.1): contact where the torque exceeds epsilon.
 
 mod barycentric;
+mod cells;
 mod cloud;
 mod energy;
+mod friction;
+mod golden;
 mod hyperspace;
 mod interpolant;
 mod line;
 mod memory;
+mod normal;
 mod order;
 mod plane;
 pub mod prediction;
@@ -25,6 +29,8 @@ mod smooth;
 mod space;
 mod tetrahedra;
 
+pub use cells::{Branches, CellReport, Cells, LeadDirection};
+pub use friction::{Reversals, gridize_sliding};
 pub use memory::{ForceHistory, Past, gridize_remembering, predict_histories};
 pub use samples::Samples;
 

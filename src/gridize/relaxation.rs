@@ -11,6 +11,7 @@
 //! are not negative; the times alone are searched, term by term on a logarithmic grid, then each along its logarithm. A
 //! further term is taken where it lessens the misfit enough.
 
+use super::{golden::golden_section, normal};
 use crate::contact::linear::support::dot;
 
 /// Times on the grid of the search, a decade (1): the misfit of a time that is off by a sixth of a decade leads
@@ -150,27 +151,12 @@ fn constrained(columns: &[Vec<f64>], y: &[f64]) -> (f64, Vec<f64>) {
 
 /// Solves the rows and columns `used` of a positive definite system; `None` where they depend on one another.
 fn solve(gram: &[Vec<f64>], right: &[f64], used: &[usize]) -> Option<Vec<f64>> {
-    /// Of a pivot over its diagonal entry: below it a column is the others' sum to rounding.
+    /// Below it a column is the others' sum to rounding (1).
     const LEAST_PIVOT: f64 = 1e-10;
-    let n = used.len();
-    let mut rows: Vec<Vec<f64>> =
-        used.iter().map(|&k| used.iter().map(|&l| gram[k][l]).chain([right[k]]).collect()).collect();
-    for pivot in 0..n {
-        if rows[pivot][pivot] <= LEAST_PIVOT * gram[used[pivot]][used[pivot]] {
-            return None;
-        }
-        let row = rows[pivot].clone();
-        for other in rows.iter_mut().skip(pivot + 1) {
-            let factor = other[pivot] / row[pivot];
-            other.iter_mut().zip(&row).for_each(|(entry, value)| *entry -= factor * value);
-        }
-    }
-    let mut x = vec![0.0; n];
-    for k in (0..n).rev() {
-        let sum: f64 = (k + 1..n).map(|l| rows[k][l] * x[l]).sum();
-        x[k] = (rows[k][n] - sum) / rows[k][k];
-    }
-    Some(x)
+    normal::solve(
+        used.iter().map(|&k| used.iter().map(|&l| gram[k][l]).chain([right[k]]).collect()).collect(),
+        LEAST_PIVOT,
+    )
 }
 
 /// A choice of times and what it leaves.
@@ -192,33 +178,19 @@ impl Fit {
 
     /// Moves time `term` to where the misfit is least between its neighbours on the grid.
     fn refine(&mut self, problem: &Problem<'_>, y: &[f64], term: usize, bounds: [f64; 2]) {
-        const GOLDEN: f64 = std::f64::consts::GOLDEN_RATIO - 1.0;
         let centre = self.times[term].ln();
         let reach = std::f64::consts::LN_10 / A_DECADE;
-        let [mut low, mut high] = [(centre - reach).max(bounds[0].ln()), (centre + reach).min(bounds[1].ln())];
-        let at = |x: f64, fit: &mut Self| {
-            let mut columns = fit.columns.clone();
+        let range = [(centre - reach).max(bounds[0].ln()), (centre + reach).min(bounds[1].ln())];
+        golden_section(range, HALVINGS, |x| {
+            let mut columns = self.columns.clone();
             columns[term + 1] = problem.column(Some(x.exp()));
             let (left, factors) = constrained(&columns, y);
-            if left < fit.left {
-                fit.times[term] = x.exp();
-                (fit.columns, fit.factors, fit.left) = (columns, factors, left);
+            if left < self.left {
+                self.times[term] = x.exp();
+                (self.columns, self.factors, self.left) = (columns, factors, left);
             }
             left
-        };
-        let [mut a, mut b] = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-        let [mut of_a, mut of_b] = [at(a, self), at(b, self)];
-        for _ in 0..HALVINGS {
-            if of_a < of_b {
-                (high, b, of_b) = (b, a, of_a);
-                a = high - GOLDEN * (high - low);
-                of_a = at(a, self);
-            } else {
-                (low, a, of_a) = (a, b, of_b);
-                b = low + GOLDEN * (high - low);
-                of_b = at(b, self);
-            }
-        }
+        });
     }
 
     fn shares(&self) -> impl Iterator<Item = f64> + '_ {

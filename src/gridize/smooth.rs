@@ -8,7 +8,10 @@
 //! with (d + 1) / k for the noise of the plane itself, k neighbours. Exact measurements stay as they are, linear
 //! torques too, and edges keep their height.
 
-use super::cloud::{Cloud, Position};
+use super::{
+    cloud::{Cloud, Position},
+    normal,
+};
 use crate::{Error, MAX_AXES};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -110,19 +113,18 @@ fn smoothed(cloud: &Cloud, near: &[(f64, u32)], point: usize, joint: usize) -> f
         (row, cloud.torques[entry(other)], cloud.variances[entry(other)], weight)
     });
     let rows: Vec<([f64; MOST], f64, f64, f64)> = rows.collect();
-    let mut normal = [[0.0; MOST + 1]; MOST];
+    let mut normal = vec![vec![0.0; joints + 2]; joints + 1];
     for (row, torque, _, weight) in &rows {
-        for (i, line) in normal.iter_mut().enumerate().take(joints + 1) {
-            for (j, entry) in line.iter_mut().enumerate().take(joints + 1) {
-                *entry += weight * row[i] * row[j];
+        for (i, line) in normal.iter_mut().enumerate() {
+            for (entry, value) in line.iter_mut().zip(row[..=joints].iter().chain([torque])) {
+                *entry += weight * row[i] * value;
             }
-            line[MOST] += weight * row[i] * torque;
         }
     }
-    let Some(plane) = solve(normal, joints + 1) else { return own };
+    let Some(plane) = normal::solve(normal, PLANE_PIVOT) else { return own };
     let (mut total, mut residual, mut noise) = (0.0, 0.0, 0.0);
     for (row, torque, variance, weight) in &rows {
-        let fitted: f64 = row.iter().zip(plane).map(|(x, c)| x * c).sum();
+        let fitted: f64 = row.iter().zip(&plane).map(|(x, c)| x * c).sum();
         total += weight;
         residual += weight * (torque - fitted).powi(2);
         noise += weight * variance;
@@ -131,28 +133,4 @@ fn smoothed(cloud: &Cloud, near: &[(f64, u32)], point: usize, joint: usize) -> f
     let curved = (residual / (total * freedom) - noise / total).max(0.0);
     let share = variance / (variance * (2.0 - freedom) + curved);
     own + share * (plane[0] - own)
-}
-
-/// Solves the symmetric system of the first `count` rows, right-hand side in the last column; `None` when the
-/// neighbours span no plane.
-fn solve(mut rows: [[f64; MOST + 1]; MOST], count: usize) -> Option<[f64; MOST]> {
-    let greatest = (0..count).map(|i| rows[i][i]).fold(0.0, f64::max);
-    for step in 0..count {
-        if rows[step][step] <= PLANE_PIVOT * greatest {
-            return None;
-        }
-        let pivot = rows[step];
-        for row in &mut rows[step + 1..count] {
-            let factor = row[step] / pivot[step];
-            for (entry, pivot) in row.iter_mut().zip(pivot) {
-                *entry -= factor * pivot;
-            }
-        }
-    }
-    let mut solution = [0.0; MOST];
-    for step in (0..count).rev() {
-        let known: f64 = (step + 1..count).map(|column| rows[step][column] * solution[column]).sum();
-        solution[step] = (rows[step][MOST] - known) / rows[step][step];
-    }
-    Some(solution)
 }

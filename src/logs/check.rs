@@ -83,6 +83,8 @@ impl Mapping {
         }
         let message = "torque.relaxes needs every row with its time: set torque.keep to \"all\"";
         refuse(torque.relaxes && torque.keep != Keep::All, "torque.keep", message)?;
+        let message = "torque.friction compares both directions of motion: set torque.keep to \"average\"";
+        refuse(torque.friction && torque.keep != Keep::Average, "torque.keep", message)?;
         let cells = torque.cell.len() == count && torque.cell.iter().all(|&side| is_positive(side));
         let message = format!("torque.cell must hold {count} positive numbers, one a joint, to average rows");
         refuse(torque.keep != Keep::All && !cells, "torque.cell", message)

@@ -2,11 +2,7 @@
 //! dataset without code. `datasets/instrument.toml` is an example with every key explained.
 
 use super::units::ColumnUnit;
-use crate::{
-    Error,
-    dataset::JointLabel,
-    scene::{self, Diagnostic},
-};
+use crate::{Error, dataset::JointLabel, scene};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -149,6 +145,9 @@ pub struct Torque {
     /// Whether the object relaxes: rows are kept with their times then, and `gridize` identifies how its force fades. It
     /// needs `keep = "all"`, and a log in which each segment begins untouched.
     pub relaxes: bool,
+    /// Whether the friction that tells one direction of motion from the other is the object's own, not that of the device:
+    /// `gridize` identifies it then. It needs `keep = "average"`.
+    pub friction: bool,
     /// Rows are averaged in cells of C-space with these sides, one a joint (rad or m); needed for all but `all`.
     pub cell: Vec<f64>,
 }
@@ -243,7 +242,7 @@ impl Mapping {
     /// # Errors
     /// The error names the file, the line and the key.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Error> {
-        let invalid = |place, message: &str| Error::new(Diagnostic::new(path, text, place, message).to_string());
+        let invalid = |place, message: &str| Error::in_text(path, text, place, message);
         let mut mapping: Self =
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
         for joint in mapping.joints.iter_mut().filter(|joint| joint.unit.is_empty()) {

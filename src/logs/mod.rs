@@ -10,24 +10,23 @@
 //!
 //! A log may also be an MCAP file of a robot: its joint states are read as a table ([`crate::ros`]).
 
-mod cells;
 mod check;
+mod guess;
 mod mapping;
 mod rows;
 mod units;
 mod window;
 
-pub use cells::CellReport;
+pub use guess::{GuessedMapping, draws, guess};
 pub use mapping::{BadRows, ColumnName, Effort, Filter, Joint, Keep, Mapping, Quantity, Table, Time, Torque};
 pub use units::ColumnUnit;
 
 use crate::{
     Error, JointVector, error,
-    gridize::{ForceHistory, Samples},
+    gridize::{Branches, CellReport, Cells, ForceHistory, LeadDirection, Samples},
     input,
     ros::{JointStateTable, is_mcap},
 };
-use cells::{Cells, Direction};
 use rows::{ReadRowResult, Row, Rows};
 use std::{
     fmt,
@@ -117,7 +116,7 @@ pub struct Imported {
     pub samples: Samples,
     /// Both branches, moving forward and backward, where rows were averaged by direction.
     pub branches: Option<[Samples; 2]>,
-    /// Every row with its time, a segment each, where the mapping says that the object relaxes.
+    /// Every row with its time, a segment each, where the mapping says that the object relaxes or holds back.
     pub histories: Vec<ForceHistory>,
     /// Report of the import.
     pub report: ImportReport,
@@ -187,6 +186,8 @@ struct Import<'a> {
     cells: Cells,
     samples: Samples,
     histories: Vec<ForceHistory>,
+    /// Kept one by one.
+    rows: usize,
     report: ImportReport,
 }
 
@@ -228,6 +229,7 @@ impl<'a> Import<'a> {
             cells: Cells::new(&mapping.torque.cell),
             samples: Samples { joints: mapping.labels(), ..Samples::default() },
             histories: vec![ForceHistory::default()],
+            rows: 0,
             report: ImportReport::default(),
         }
     }
@@ -303,29 +305,29 @@ impl<'a> Import<'a> {
         if block.count == 0 {
             return Ok(());
         }
-        let Torque { keep, still, .. } = self.mapping.torque;
+        let Torque { keep, still, relaxes, friction, .. } = self.mapping.torque;
         let lead = block.speed[self.mapping.lead()];
         let at_rest = block.speed.iter().all(|speed| speed.abs() <= still);
-        let direction = if lead < 0.0 { Direction::Backward } else { Direction::Forward };
+        let direction = if lead < 0.0 { LeadDirection::Backward } else { LeadDirection::Forward };
+        if keep == Keep::All || friction {
+            self.rows += 1;
+            if self.rows > IMPORT_SAMPLES {
+                return Err(error!(
+                    "more than {IMPORT_SAMPLES} samples: set filter.decimate, or average rows in cells (torque.keep and \
+                     torque.cell)"
+                ));
+            }
+        }
+        if let Some(history) = self.histories.last_mut().filter(|_| relaxes || friction) {
+            history.push(block.time, &block.q, &block.torque, (lead.abs() > still).then_some(direction));
+        }
         match keep {
             Keep::All => {
-                if self.samples.len() >= IMPORT_SAMPLES {
-                    return Err(error!(
-                        "more than {IMPORT_SAMPLES} samples: set filter.decimate, or average rows in cells (torque.keep \
-                         and torque.cell)"
-                    ));
-                }
                 self.samples.configurations.extend_from_slice(&block.q);
                 self.samples.torques.extend_from_slice(&block.torque);
-                if let Some(history) = self.histories.last_mut().filter(|_| self.mapping.torque.relaxes) {
-                    history.times.push(block.time);
-                    history.configurations.extend_from_slice(&block.q);
-                    history.torques.extend_from_slice(&block.torque);
-                    history.counts.push(true);
-                }
                 Ok(())
             }
-            Keep::Static if at_rest => self.cells.add(&block.q, &block.torque, Direction::Forward),
+            Keep::Static if at_rest => self.cells.add(&block.q, &block.torque, LeadDirection::Forward),
             Keep::Average | Keep::Forward | Keep::Backward if lead.abs() > still => {
                 self.cells.add(&block.q, &block.torque, direction)
             }
@@ -348,13 +350,20 @@ impl<'a> Import<'a> {
             return Err(error!("{dropped} of {rows} rows cannot be used ({listed}): {remedy}"));
         }
         let keep = self.mapping.torque.keep;
+        let ways = [LeadDirection::Forward, LeadDirection::Backward].map(Branches::One);
+        let combined = match keep {
+            Keep::All => None,
+            Keep::Static => Some(Branches::Any),
+            Keep::Average => Some(Branches::Mean),
+            Keep::Forward => Some(ways[0]),
+            Keep::Backward => Some(ways[1]),
+        };
         let mut branches = None;
-        if keep != Keep::All {
-            self.samples = self.cells.samples(keep, &self.samples.joints);
+        if let Some(combined) = combined {
+            let joints = std::mem::take(&mut self.samples.joints);
             self.report.cells = Some(self.cells.report());
-        }
-        if !matches!(keep, Keep::All | Keep::Static) {
-            branches = Some([Keep::Forward, Keep::Backward].map(|keep| self.cells.samples(keep, &self.samples.joints)));
+            branches = (keep != Keep::Static).then(|| ways.map(|way| self.cells.samples(way, &joints)));
+            self.samples = self.cells.samples(combined, &joints);
         }
         self.report.samples = self.samples.len();
         if self.samples.is_empty() {

@@ -245,7 +245,7 @@ fn listed(names: &[&str]) -> String {
 }
 
 /// A finite number written with `decimal`.
-fn number(field: &str, decimal: char) -> Option<f64> {
+pub(super) fn number(field: &str, decimal: char) -> Option<f64> {
     if decimal == '.' {
         return field.parse().ok().filter(|x: &f64| x.is_finite());
     }

@@ -47,6 +47,26 @@ pub enum ColumnUnit {
 }
 
 impl ColumnUnit {
+    /// Its name in a mapping.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Radian => "rad",
+            Self::Degree => "deg",
+            Self::Metre => "m",
+            Self::Centimetre => "cm",
+            Self::Millimetre => "mm",
+            Self::NewtonMetre => "N m",
+            Self::NewtonCentimetre => "N cm",
+            Self::NewtonMillimetre => "N mm",
+            Self::Newton => "N",
+            Self::Millinewton => "mN",
+            Self::Second => "s",
+            Self::Millisecond => "ms",
+            Self::Microsecond => "us",
+        }
+    }
+
     /// How many SI units one is, and which.
     #[must_use]
     pub fn in_si(self) -> (f64, &'static str) {

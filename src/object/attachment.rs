@@ -87,6 +87,11 @@ impl Attachment {
     /// Sets `loads` on the nodes of K to those of `forces`, one per node of the object (N); missing ones are zero.
     pub fn spread(&self, forces: &[DVec3], loads: &mut [DVec3]) {
         loads.fill(DVec3::ZERO);
+        self.add(forces, loads);
+    }
+
+    /// Adds `forces`, one for each of the object's nodes, to `loads` on the nodes of K (N).
+    pub fn add(&self, forces: &[DVec3], loads: &mut [DVec3]) {
         let forces = forces.iter().take(self.rows()).enumerate();
         for (node, force) in forces.filter(|(_, force)| **force != DVec3::ZERO) {
             self.row(node).iter().for_each(|&(column, weight)| loads[column as usize] += weight * *force);

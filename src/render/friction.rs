@@ -88,7 +88,7 @@ impl Friction {
         let &Pending { npmi, stage, interval, velocity, ref load } = pending;
         let reach = |coefficient| coefficient * slip.normal_force / self.stiffness;
         let sticking = reach(if state.slid { self.kinetic } else { self.stiction });
-        let mut start = shortened(&state.deflection, sticking);
+        let mut start = state.deflection.shortened(sticking);
         if slip.normal_force <= 0.0 {
             *state = FrictionState { deflection: start, slid: false };
             return npmi.advance(stage, motion, interval, load);
@@ -97,7 +97,7 @@ impl Friction {
         let predicted = moved(&start, slip, interval, &velocity);
         if predicted.dot(&predicted) > sticking * sticking {
             let kinetic = reach(self.kinetic);
-            start = shortened(&start, kinetic);
+            start = start.shortened(kinetic);
             alpha = (kinetic / moved(&start, slip, interval, &velocity).norm()).min(1.0);
         }
         let before = *motion;
@@ -118,7 +118,7 @@ impl Friction {
         extra.friction_work = -0.5 * self.stiffness * works.sum::<f64>();
         let slid = alpha < 1.0 || kept.dot(&kept) > sticking * sticking;
         if slid {
-            kept = shortened(&kept, reach(self.kinetic));
+            kept = kept.shortened(reach(self.kinetic));
         }
         extra.presliding = 0.5 * self.stiffness * kept.dot(&kept);
         *state = FrictionState { deflection: kept, slid };
@@ -140,18 +140,7 @@ impl Friction {
 
 /// z + B T v (m).
 fn moved(start: &JointVector, slip: &Slip, interval: f64, velocity: &JointVector) -> JointVector {
-    let mut end = *start;
-    end.iter_mut().zip(&slip.jacobian).for_each(|(z, row)| *z += interval * velocity.dot(row));
-    end
-}
-
-/// `deflection`, no longer than `greatest`.
-fn shortened(deflection: &JointVector, greatest: f64) -> JointVector {
-    let mut shorter = *deflection;
-    let square = deflection.dot(deflection);
-    if square > greatest * greatest {
-        let length = square.sqrt();
-        shorter.iter_mut().for_each(|z| *z *= greatest / length);
-    }
-    shorter
+    let mut way = *velocity;
+    way.iter_mut().for_each(|rate| *rate *= interval);
+    slip.deflected(start, &way)
 }

@@ -5,10 +5,17 @@
 //! *Smoothing*, where the scene names it: f_ex_bar passes a low-pass filter of time constant tau_s,
 //! `f_k = f_{k-1} + (1 - exp(-T/tau_s)) (f_ex_bar - f_{k-1})`. The object is passive towards the filtered forces.
 //!
+//! *Memory*, where the object relaxes: see [`ObjectMemory`].
+//!
 //! *Motion*: see [`ObjectMotion`].
 
-pub use super::{contact_forces::ContactForces, object_motion::ObjectMotion};
-use crate::{Error, object::Object, scene::GraphicsSpec};
+use super::session::Latest;
+pub use super::{contact_forces::ContactForces, object_memory::ObjectMemory, object_motion::ObjectMotion};
+use crate::{
+    Error,
+    object::Object,
+    scene::{GraphicsSpec, RelaxationSpec},
+};
 use glam::DVec3;
 
 /// A low-pass filter on the contact forces.
@@ -36,34 +43,85 @@ impl Smoothing {
     }
 }
 
+/// Forces under which the object is drawn.
+pub struct DrawnForces {
+    /// Of contact, at each node (N).
+    contact: Vec<DVec3>,
+    smoothing: Option<Smoothing>,
+    memory: Option<ObjectMemory>,
+}
+
+impl DrawnForces {
+    /// None yet, of `nodes` nodes in frames at the rate and with the effects of `spec`, on an object that relaxes as
+    /// `relaxation` says.
+    #[must_use]
+    pub fn new(nodes: usize, spec: &GraphicsSpec, relaxation: Option<&RelaxationSpec>) -> Self {
+        let period = 1.0 / spec.rate;
+        Self {
+            contact: vec![DVec3::ZERO; nodes],
+            smoothing: spec.effects.smoothing.map(|time| Smoothing::new(time, period, nodes)),
+            memory: relaxation.map(|relaxation| ObjectMemory::new(relaxation, period, nodes)),
+        }
+    }
+
+    /// Takes the forces of `contact` as they were `latest`.
+    pub fn touch(&mut self, contact: &ContactForces, latest: &Latest) {
+        contact.at(&latest.proxy, latest.share, &mut self.contact);
+        if let (Some(memory), None) = (&mut self.memory, latest.dent) {
+            memory.clear();
+        }
+    }
+
+    /// The forces of contact, one for each node of the object (N).
+    #[must_use]
+    pub fn contact(&self) -> &[DVec3] {
+        &self.contact
+    }
+
+    /// Lets a frame go by; returns the forces of contact in it, smoothed, and the body force of the object's past,
+    /// which is empty where it has none (N).
+    pub fn frame(&mut self) -> [&[DVec3]; 2] {
+        let contact = match &mut self.smoothing {
+            Some(smoothing) => smoothing.toward(&self.contact),
+            None => &self.contact,
+        };
+        [contact, self.memory.as_mut().map_or(&[], |memory| memory.frame(contact))]
+    }
+}
+
 /// The graphics loop's part of a session.
 pub struct Graphics<'object> {
     contact: ContactForces,
     motion: ObjectMotion<'object>,
-    forces: Vec<DVec3>,
-    smoothing: Option<Smoothing>,
+    forces: DrawnForces,
+    /// Their sum (N).
+    sum: Vec<DVec3>,
 }
 
 impl<'object> Graphics<'object> {
-    /// `object`, deformed by the forces of `contact`, at the rate and with the effects of `spec`.
+    /// `object`, which relaxes as `relaxation` says, deformed by the forces of `contact`, at the rate and with the
+    /// effects of `spec`.
     ///
     /// # Errors
     /// When object and rate do not make a loop.
-    pub fn new(contact: ContactForces, object: &'object Object, spec: &GraphicsSpec) -> Result<Self, Error> {
+    pub fn new(
+        contact: ContactForces,
+        object: &'object Object,
+        spec: &GraphicsSpec,
+        relaxation: Option<&RelaxationSpec>,
+    ) -> Result<Self, Error> {
         let nodes = object.rest.len();
         let motion = ObjectMotion::new(object, 1.0 / spec.rate, &spec.effects)?;
-        let smoothing = spec.effects.smoothing.map(|time| Smoothing::new(time, motion.period(), nodes));
-        Ok(Self { contact, motion, forces: vec![DVec3::ZERO; nodes], smoothing })
+        Ok(Self { contact, motion, forces: DrawnForces::new(nodes, spec, relaxation), sum: vec![DVec3::ZERO; nodes] })
     }
 
-    /// One frame with the proxy at `q`, where the field puts `share` on the dataset's torque; zero out of contact.
-    pub fn frame(&mut self, q: &[f64], share: f64) {
-        self.contact.at(q, share, &mut self.forces);
-        let forces = match &mut self.smoothing {
-            Some(smoothing) => smoothing.toward(&self.forces),
-            None => &self.forces,
-        };
-        self.motion.step(forces);
+    /// One frame with the contact that was `latest`.
+    pub fn frame(&mut self, latest: &Latest) {
+        self.forces.touch(&self.contact, latest);
+        let [contact, past] = self.forces.frame();
+        self.sum.copy_from_slice(contact);
+        self.sum.iter_mut().zip(past).for_each(|(sum, past)| *sum += *past);
+        self.motion.step(&self.sum);
     }
 
     /// The object as it is now.

@@ -86,6 +86,8 @@ pub struct Output {
     pub proxy: JointVector,
     /// The contact field at x_k.
     pub sample: Sample,
+    /// See [`Tick::dent`](super::trace::Tick::dent).
+    pub dent: Option<f64>,
     /// The field's remarks and the loop's.
     pub flags: Flags,
     /// Why the torque is being brought to zero or has been, if so.
@@ -277,13 +279,14 @@ impl Haptics {
         let interval = if watchdog::is_interval(inputs.interval) { inputs.interval } else { self.period };
         let felt = Felt { elastic, sample, remembered };
         let stopped = self.move_proxy(state, interval, &velocity, &felt, contact);
-        Output { torque, device: state.device, proxy, sample, flags: sample.flags | limited | stopped, fault, accounts }
+        let flags = sample.flags | limited | stopped;
+        Output { torque, device: state.device, proxy, sample, dent: remembered.dent, flags, fault, accounts }
     }
 
     /// Returns what is felt of the `elastic` contact at the proxy, after what the object remembers of its past.
     fn remember(&self, state: &mut State, elastic: &Sample) -> (Sample, Remembered) {
         let (Some(relaxation), Some(memory)) = (&self.relaxation, &mut state.memory) else {
-            return (*elastic, Remembered { share: 1.0, stored: elastic.energy, relaxed: 0.0 });
+            return (*elastic, Remembered { share: 1.0, stored: elastic.energy, relaxed: 0.0, dent: None });
         };
         let remembered = relaxation.arrive(memory, elastic.energy);
         let mut sample = Sample { energy: remembered.stored, ..*elastic };

@@ -212,7 +212,8 @@ fn passive(spec: &HapticsSpec, source: &TorqueSource) -> HapticsSpec {
 /// The gains of `passive` that are not those of `spec`, as a scene has them: damping of the proxy, stiffness and damping
 /// of the coupling.
 fn changes(spec: &HapticsSpec, passive: &HapticsSpec) -> [Option<String>; 3] {
-    let gains: [(&str, fn(&HapticsSpec) -> &JointVector); 3] = [
+    type Gain = fn(&HapticsSpec) -> &JointVector;
+    let gains: [(&str, Gain); 3] = [
         ("proxy_damping", |gains| &gains.proxy_damping),
         ("coupling_stiffness", |gains| &gains.coupling_stiffness),
         ("coupling_damping", |gains| &gains.coupling_damping),

@@ -56,7 +56,7 @@ impl Recorder {
     pub fn new(joints: usize) -> (Self, Ends) {
         let (recorder, ticks) = rtrb::RingBuffer::new(RING);
         let start = JointVector::zeros(joints);
-        let before = Latest { time: -1.0, proxy: start, device: start, share: 0.0 };
+        let before = Latest { time: -1.0, proxy: start, device: start, share: 0.0, dent: None };
         let (latest, reader) = triple_buffer::triple_buffer(&before);
         (Self { ticks: recorder, latest, unrecorded: 0 }, Ends { ticks, latest: reader })
     }

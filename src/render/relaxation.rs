@@ -63,6 +63,8 @@ pub(super) struct Memory {
     slid: f64,
     /// What the drag took in it (J).
     drag: f64,
+    /// w at the last contact (sqrt(J)).
+    touched: f64,
 }
 
 /// The object's energy, as the proxy comes to where it is.
@@ -74,6 +76,8 @@ pub(super) struct Remembered {
     pub stored: f64,
     /// What was lost of H and the drag since the tick before (J).
     pub relaxed: f64,
+    /// w_s over w at the last contact (1).
+    pub dent: Option<f64>,
 }
 
 impl Relaxation {
@@ -109,7 +113,11 @@ impl Relaxation {
         let stored = self.stored(w, &memory.z);
         let separation = self.separation(&memory.z);
         let share = if w > separation { 1.0 - separation / w } else { 0.0 };
-        Remembered { share, stored, relaxed: before - stored }
+        if w > separation {
+            memory.touched = w;
+        }
+        let dent = if memory.touched > 0.0 { (separation / memory.touched).min(1.0) } else { 0.0 };
+        Remembered { share, stored, relaxed: before - stored, dent: Some(dent) }
     }
 
     /// Adds the drag of sliding to `load`, with the elastic energy U (J) and the slip rate of the step before (m/s).

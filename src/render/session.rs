@@ -53,6 +53,8 @@ pub struct Latest {
     pub device: JointVector,
     /// Factor on the dataset's contact forces; zero out of contact.
     pub share: f64,
+    /// See [`Tick::dent`].
+    pub dent: Option<f64>,
 }
 
 /// The haptic loop as what answers a device. A tick gives its record and what graphics needs of it.
@@ -161,13 +163,14 @@ impl Controller for HapticController<'_> {
             device_torque: output.torque,
             applied: Applied::default(),
             sample: output.sample,
+            dent: output.dent,
             flags: output.flags,
             fault: output.fault,
             accounts: output.accounts,
             frames: 0,
         };
         let share = if output.sample.contact { output.sample.share } else { 0.0 };
-        self.tick = Some((tick, Latest { time, proxy: output.proxy, device: output.device, share }));
+        self.tick = Some((tick, Latest { time, proxy: output.proxy, device: output.device, share, dent: output.dent }));
         output.torque
     }
 
@@ -201,7 +204,7 @@ impl<'session, 'object> Frames<'session, 'object> {
     /// Draws the next frame.
     pub(super) fn draw(&mut self, latest: &Latest) {
         let time = self.due();
-        self.graphics.frame(&latest.proxy, latest.share);
+        self.graphics.frame(latest);
         self.shown.push(latest.time);
         let mut wanted = false;
         while self.snapshots.next_if(|&instant| instant <= time).is_some() {

@@ -20,7 +20,7 @@ use crate::{
     object::Object,
     proxy::Chain,
     scene::{
-        BOUNDARY_SLOPE, Diagnostic, HapticsSpec, Interpolation, LEVER_ARM, LINEAR_RELAXATION, ProxyInertia, Rendering,
+        BOUNDARY_SLOPE, Checker, HapticsSpec, Interpolation, LEVER_ARM, LINEAR_RELAXATION, ProxyInertia, Rendering,
         THRESHOLD,
     },
 };
@@ -151,7 +151,9 @@ impl Setup {
     /// When the dataset's contact forces do not fit the object.
     pub fn graphics(&self, dataset: &Dataset) -> Result<Option<Graphics<'_>>, Error> {
         match (&self.object, &self.scene.graphics, self.contact_forces(dataset)?) {
-            (Some(object), Some(graphics), Some(forces)) => Ok(Some(Graphics::new(forces, object, graphics)?)),
+            (Some(object), Some(graphics), Some(forces)) => {
+                Ok(Some(Graphics::new(forces, object, graphics, self.scene.haptics.relaxation.as_ref())?))
+            }
             _ => Ok(None),
         }
     }
@@ -198,12 +200,12 @@ pub fn field(dataset: &Dataset, interpolation: Option<Interpolation>) -> Result<
 
 /// The scene in `dataset`.
 fn scene_of(dataset: &Dataset) -> Result<Rendering, Error> {
-    Rendering::parse(&dataset.scene, "scene").map_err(|error| Error::from(error).within(IN_DATASET))
+    Rendering::parse(&dataset.scene, "scene").map_err(|error| error.within(IN_DATASET))
 }
 
 /// The error of a scene in a dataset that names at `key` what cannot act.
 fn refused(scene: &Rendering, key: &str, message: String) -> Error {
-    Error::from(Diagnostic::at(&scene.path, &scene.text, key, message)).within(IN_DATASET)
+    Checker { path: &scene.path, text: &scene.text }.at(key, message).within(IN_DATASET)
 }
 
 /// Where such a scene stands.

@@ -38,6 +38,9 @@ pub struct Tick {
     pub applied: Applied,
     /// Contact that the proxy felt.
     pub sample: Sample,
+    /// Part of the dent that would stay if the arm let go, or that is left since it did: w_s over the root of the energy
+    /// at the last contact, 0 to 1; absent where the object does not relax.
+    pub dent: Option<f64>,
     /// Remarks on the tick.
     pub flags: Flags,
     /// Why the torque is being brought to zero, if it is.

@@ -13,8 +13,9 @@ pub mod slices;
 pub mod space;
 
 use crate::{
+    Error, ErrorKind,
     dataset::{Dataset, replace_file},
-    draw::canvas::{Canvas, PictureError},
+    draw::canvas::Canvas,
     proxy::Chain,
     render::{live::LiveScene, trace::Trace},
 };
@@ -32,31 +33,6 @@ use std::{
 
 /// Pixels a point in PNG files: sharp on dense screens and in print.
 pub const PIXELS: f64 = 2.0;
-
-/// Why a figure could not be drawn or written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReportError {
-    /// The figure's file or folder could not be written.
-    #[error("cannot write {}: {source}; check that the folder exists, is writable and has room", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// The system's message.
-        source: std::io::Error,
-    },
-    /// The sheet could not be rasterised.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
-    /// The data cannot be drawn at all: their parts contradict each other.
-    #[error("cannot draw {figure}: {reason}")]
-    Data {
-        /// Which figure.
-        figure: &'static str,
-        /// The contradiction, and the remedy.
-        reason: String,
-    },
-}
 
 /// Files that [`write_figures`] may write.
 pub const FIGURES: [&str; 10] = [
@@ -80,7 +56,7 @@ pub struct Figure<'a> {
     name: &'static str,
     /// What is made of pixels is no drawing, and has no SVG.
     is_drawing: bool,
-    draw: Box<dyn FnOnce() -> Result<Canvas, ReportError> + Send + 'a>,
+    draw: Box<dyn FnOnce() -> Result<Canvas, Error> + Send + 'a>,
 }
 
 impl<'a> Figure<'a> {
@@ -90,7 +66,7 @@ impl<'a> Figure<'a> {
     }
 
     /// The figure `NAME.png`.
-    fn picture(name: &'static str, draw: impl FnOnce() -> Result<Canvas, ReportError> + Send + 'a) -> Self {
+    fn picture(name: &'static str, draw: impl FnOnce() -> Result<Canvas, Error> + Send + 'a) -> Self {
         Self { name, is_drawing: false, draw: Box::new(draw) }
     }
 
@@ -118,8 +94,8 @@ where
     if live.is_none() {
         let shown = dataset.clone();
         figures.push(Figure::picture("cspace", move || Ok(space::space(&shown))));
-        let shown = dataset.clone();
-        figures.push(Figure::drawing("torque", move || slices::slices(&shown)));
+        let (shown, deepest) = (dataset.clone(), recording.and_then(|(_, trace)| press::deepest(trace)));
+        figures.push(Figure::drawing("torque", move || slices::slices(&shown, deepest.as_deref())));
     }
     let Some((chain, trace)) = recording else { return figures };
     let shown = trace.clone();
@@ -143,13 +119,12 @@ where
 /// Writes all [`figures`] that the data allow into `folder`, which is made if it is missing, and returns their paths.
 ///
 /// # Errors
-/// [`ReportError::Write`] when a file cannot be written, [`ReportError::Data`] when recording, chain and dataset do not
-/// belong together.
+/// When a file cannot be written, or recording, chain and dataset do not belong together.
 pub fn write_figures(
     folder: &Path,
     dataset: &Dataset,
     recording: Option<(&Chain, &Trace)>,
-) -> Result<Vec<PathBuf>, ReportError> {
+) -> Result<Vec<PathBuf>, Error> {
     let recording = recording.as_ref().map(|(chain, trace)| (chain, trace));
     let figures = figures(&dataset, recording, None);
     let files: Vec<PathBuf> = figures.iter().flat_map(|figure| figure.files(folder)).collect();
@@ -162,8 +137,8 @@ pub fn write_figures(
 /// Writes `figures` into `folder` on all processors, drawings before what is made of pixels, and tells each file.
 fn write_all(folder: &Path, figures: Vec<Figure<'_>>, told: &Told) {
     // Whom nobody listens to any more is left to finish.
-    let tell = |file: Result<PathBuf, ReportError>| drop(told.send(file));
-    let write_svg = |figure: Figure<'_>| -> Result<(&'static str, Canvas), ReportError> {
+    let tell = |file: Result<PathBuf, Error>| drop(told.send(file));
+    let write_svg = |figure: Figure<'_>| -> Result<(&'static str, Canvas), Error> {
         let canvas = (figure.draw)()?;
         tell(write(folder.join(figure.name).with_extension("svg"), canvas.svg().as_bytes()));
         Ok((figure.name, canvas))
@@ -182,7 +157,7 @@ fn write_all(folder: &Path, figures: Vec<Figure<'_>>, told: &Told) {
 }
 
 /// Where files are told once they are written.
-type Told = mpsc::Sender<Result<PathBuf, ReportError>>;
+type Told = mpsc::Sender<Result<PathBuf, Error>>;
 
 /// Files of some figures.
 #[derive(Debug)]
@@ -201,11 +176,7 @@ const LOOK: Duration = Duration::from_millis(20);
 ///
 /// # Errors
 /// As [`write_figures`].
-pub fn write_until(
-    is_late: impl Fn() -> bool,
-    folder: &Path,
-    figures: Vec<Figure<'static>>,
-) -> Result<Files, ReportError> {
+pub fn write_until(is_late: impl Fn() -> bool, folder: &Path, figures: Vec<Figure<'static>>) -> Result<Files, Error> {
     let all: Vec<PathBuf> = figures.iter().flat_map(|figure| figure.files(folder)).collect();
     let mut there = Vec::new();
     let (told, files) = mpsc::channel();
@@ -229,8 +200,8 @@ pub fn write_until(
 /// Writes `NAME.svg` and `NAME.png` into `folder`, which is made if it is missing.
 ///
 /// # Errors
-/// [`ReportError::Write`] when a file cannot be written.
-pub fn write_both(folder: &Path, name: &str, canvas: &Canvas) -> Result<[PathBuf; 2], ReportError> {
+/// When a file cannot be written.
+pub fn write_both(folder: &Path, name: &str, canvas: &Canvas) -> Result<[PathBuf; 2], Error> {
     let svg = write(folder.join(name).with_extension("svg"), canvas.svg().as_bytes())?;
     Ok([svg, write_png(folder, name, canvas)?])
 }
@@ -238,15 +209,18 @@ pub fn write_both(folder: &Path, name: &str, canvas: &Canvas) -> Result<[PathBuf
 /// Writes `NAME.png` into `folder`, which is made if it is missing.
 ///
 /// # Errors
-/// [`ReportError::Write`] when the file cannot be written.
-pub fn write_png(folder: &Path, name: &str, canvas: &Canvas) -> Result<PathBuf, ReportError> {
+/// When the file cannot be written.
+pub fn write_png(folder: &Path, name: &str, canvas: &Canvas) -> Result<PathBuf, Error> {
     write(folder.join(name).with_extension("png"), &canvas.pixels(PIXELS)?.png()?)
 }
 
-pub(crate) fn write(path: PathBuf, bytes: &[u8]) -> Result<PathBuf, ReportError> {
+pub(crate) fn write(path: PathBuf, bytes: &[u8]) -> Result<PathBuf, Error> {
     let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
     match made.and_then(|()| replace_file(&path, |file| file.write_all(bytes))) {
         Ok(()) => Ok(path),
-        Err(source) => Err(ReportError::Write { path, source }),
+        Err(source) => {
+            let remedy = "check that the folder exists, is writable and has room";
+            Err(Error::at(&path, format_args!("cannot be written: {source}; {remedy}")).of(ErrorKind::File))
+        }
     }
 }

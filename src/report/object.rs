@@ -1,8 +1,9 @@
 //! The deformed object with the proxy at a few instants (paper's Fig. 6), coloured by displacement, with the contact
 //! forces as arrows.
 
-use super::{PIXELS, ReportError};
+use super::PIXELS;
 use crate::{
+    Error,
     contact::NodeForce,
     dataset::Dataset,
     draw::{
@@ -14,6 +15,7 @@ use crate::{
         solid::{self, Cone},
         ticks,
     },
+    error,
     proxy::{Chain, Pose, Triangles, shape_frame, shape_triangles},
     render::{
         graphics::ContactForces,
@@ -54,15 +56,15 @@ const CELL: [f64; 2] = [226.0, 200.0];
 /// 50 ms or closer leave something to choose from. `live`: the scene, where its contact was solved in every tick.
 ///
 /// # Errors
-/// [`ReportError::Data`] when frames, dataset and chain do not belong together.
+/// When frames, dataset and chain do not belong together.
 pub fn instants(
     dataset: &Dataset,
     chain: &Chain,
     trace: &Trace,
     count: usize,
     live: Option<Arc<LiveScene>>,
-) -> Result<Vec<Instant>, ReportError> {
-    let refused = |reason: String| ReportError::Data { figure: "the deformed object", reason };
+) -> Result<Vec<Instant>, Error> {
+    let refused = |reason: String| error!("cannot draw the deformed object: {reason}");
     if chain.joints.len() != dataset.grid.joints() {
         let (joints, axes) = (chain.joints.len(), dataset.grid.joints());
         return Err(refused(format!("the chain has {joints} joints, the dataset {axes}; load both from one scene")));
@@ -108,9 +110,9 @@ pub fn instants(
 /// The object at all `instants`, in rows of three, one camera and one colour map for all.
 ///
 /// # Errors
-/// [`ReportError::Data`] when there is no surface or an instant has another number of nodes.
-pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<Canvas, ReportError> {
-    let refused = |reason: String| ReportError::Data { figure: "the deformed object", reason };
+/// When there is no surface or an instant has another number of nodes.
+pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<Canvas, Error> {
+    let refused = |reason: String| error!("cannot draw the deformed object: {reason}");
     let surface = dataset
         .surface
         .as_ref()

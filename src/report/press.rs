@@ -33,7 +33,7 @@ pub fn titled(headline: &str, trace: &Trace) -> Canvas {
         tick.device_torque.get(joint).copied()
     }));
     let start = trace.ticks.first().map_or_else(|| JointVector::zeros(trace.joints.len()), |tick| tick.proxy);
-    lanes.extend(per_joint(trace, ["Motion of the proxy"; 2], false, |tick, joint| {
+    lanes.extend(per_joint(trace, ["Motion from the start"; 2], false, |tick, joint| {
         Some(tick.proxy.get(joint)? - start.get(joint)?)
     }));
     // A measured dataset knows no nodes.
@@ -42,7 +42,7 @@ pub fn titled(headline: &str, trace: &Trace) -> Canvas {
     {
         let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.sample.contact_nodes));
         lanes.push(Lane {
-            title: "Contacting object nodes [1]".to_owned(),
+            title: "Object nodes in contact, as its grid point knows them [1]".to_owned(),
             curves: vec![nodes],
             height: 90.0,
             counts: true,
@@ -75,9 +75,9 @@ pub fn energy(trace: &Trace) -> Canvas {
     // A measured dataset knows no stored energy, and so no leak.
     let knows_energy = trace.ticks.iter().any(|tick| tick.accounts.stored != 0.0 || tick.accounts.leak != 0.0);
     let mut lanes = vec![
-        lane("Kept [mJ]", &kept[usize::from(!knows_energy)..]),
+        lane("Energy held [mJ]", &kept[usize::from(!knows_energy)..]),
         lane(
-            "Exchanged [mJ]",
+            "Work and losses [mJ]",
             &[
                 ("by the coupling", |accounts| accounts.coupling_work),
                 ("by the contact torque", |accounts| accounts.field_work),
@@ -129,6 +129,13 @@ fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick
 fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick) -> f64) -> Curve {
     let points = trace.ticks.iter().map(|tick| (tick.time, value(tick))).collect();
     Curve { name: name.to_owned(), colour, dashed: false, points }
+}
+
+/// The configuration with the largest contact torque, if there is contact (rad or m).
+pub(super) fn deepest(trace: &Trace) -> Option<JointVector> {
+    let size = |tick: &&Tick| tick.sample.torque.norm();
+    let touching = trace.ticks.iter().filter(|tick| tick.sample.contact);
+    touching.max_by(|a, b| size(a).total_cmp(&size(b))).map(|tick| tick.proxy)
 }
 
 /// Begin and end of each uninterrupted contact (s).

@@ -1,7 +1,8 @@
 //! The torque field on a plane of C-space: one heat map a joint, with the contact boundary.
 //!
-//! The plane shown is the one with the largest torques of all planes along two joints that cross the contact boundary;
-//! the other joints stay at that plane's values. The boundary is the zero line of the gap, or, where no gap is stored,
+//! The plane shown is the one with the largest torques of all planes along two joints that cross the contact boundary,
+//! or of those through a configuration; the other joints stay at that plane's values. A few large torques, as at the
+//! edge of an object, do not pale the others: colours then end where all but a fiftieth of the cells do. The boundary is the zero line of the gap, or, where no gap is stored,
 //! the line on which the contact index, interpolated, is one half (section 3.1).
 
 use super::press::subscript;
@@ -21,13 +22,14 @@ use std::collections::BTreeMap;
 /// Most cells drawn along a side: finer than the eye sees, and a bound on the file's size.
 const MOST_CELLS: usize = 160;
 
-/// Heat maps of all joint torques over two joints; curves for a single joint.
+/// Heat maps of all joint torques over two joints, on a plane `through` the grid point nearest to a configuration where
+/// there is one; curves for a single joint.
 #[must_use]
-pub fn slices(dataset: &Dataset) -> Canvas {
+pub fn slices(dataset: &Dataset, through: Option<&[f64]>) -> Canvas {
     if dataset.grid.joints() < 2 {
         return line(dataset);
     }
-    let slice = Slice::worth_showing(dataset);
+    let slice = Slice::worth_showing(dataset, through.and_then(|q| dataset.grid.nearest(q)));
     // Four are better two by two than three and one.
     let columns = if dataset.grid.joints() == 4 { 2 } else { dataset.grid.joints().min(3) };
     let rows = dataset.grid.joints().div_ceil(columns);
@@ -49,6 +51,11 @@ pub fn slices(dataset: &Dataset) -> Canvas {
 /// Least range of a colour map over the greatest torque of any joint of the same unit (1): noise of a hundredth of what
 /// is felt stays pale.
 const LEAST_SHARE: f64 = 0.05;
+
+/// Share of the cells in contact, those with the largest torques, that may be beyond the map's end (1), and how much
+/// larger than the others they are then (1).
+const CUT: f64 = 0.02;
+const OUTLYING: f64 = 1.5;
 
 const WIDTH: f64 = 860.0;
 const TOP: f64 = 72.0;
@@ -91,7 +98,7 @@ impl Tally {
 }
 
 impl Slice {
-    fn worth_showing(dataset: &Dataset) -> Self {
+    fn worth_showing(dataset: &Dataset, through: Option<usize>) -> Self {
         let grid = &dataset.grid;
         let joints = grid.joints();
         let mut best = (Worth::default(), [0, 1], 0);
@@ -101,8 +108,9 @@ impl Slice {
                 for point in 0..grid.points() {
                     planes.entry(Self::origin(dataset, [across, up], point)).or_default().count(dataset, point);
                 }
+                let through = through.map(|point| Self::origin(dataset, [across, up], point));
                 for (origin, tally) in planes {
-                    if tally.worth() > best.0 {
+                    if tally.worth() > best.0 && through.is_none_or(|through| through == origin) {
                         best = (tally.worth(), [across, up], origin);
                     }
                 }
@@ -131,16 +139,29 @@ impl Slice {
         dataset.grid.point(lines)
     }
 
+    /// Torque of `joint` in a cell; not a number where nothing is known (N m or N).
+    fn torque(&self, dataset: &Dataset, cell: [usize; 2], joint: usize) -> f64 {
+        let point = self.point(dataset, cell);
+        if dataset.status(point) == Status::Outside { f64::NAN } else { dataset.torque(point)[joint] }
+    }
+
+    /// The size of torque with the colour of the map's end (N m or N), and whether some cells are beyond it.
+    fn end(&self, dataset: &Dataset, joint: usize) -> (f64, bool) {
+        let [across, up] = self.cells(dataset);
+        let cells = (0..across).flat_map(|x| (0..up).map(move |y| [x, y]));
+        let sizes = cells.map(|cell| self.torque(dataset, cell, joint).abs());
+        let mut sizes: Vec<f64> = sizes.filter(|size| *size > 0.0 && size.is_finite()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        let Some(last) = sizes.len().checked_sub(1) else { return (0.0, false) };
+        let (most, greatest) = (sizes[last - (CUT * last as f64).ceil() as usize], sizes[last]);
+        if greatest > OUTLYING * most { (most, true) } else { (greatest, false) }
+    }
+
     fn draw(&self, canvas: &mut Canvas, dataset: &Dataset, joint: usize, area: Area) {
         let cells = self.cells(dataset);
-        let torque = |cell, joint: usize| {
-            let point = self.point(dataset, cell);
-            if dataset.status(point) == Status::Outside { f64::NAN } else { dataset.torque(point)[joint] }
-        };
+        let torque = |cell, joint: usize| self.torque(dataset, cell, joint);
         let all = || (0..cells[0]).flat_map(|x| (0..cells[1]).map(move |y| [x, y]));
-        let greatest = |joint: usize| {
-            all().map(|cell| torque(cell, joint).abs()).filter(|size| size.is_finite()).fold(0.0, f64::max)
-        };
+        let greatest = |joint: usize| self.end(dataset, joint).0;
         // A joint that hardly feels anything is drawn pale beside those of its unit, not as vividly as these.
         let of_unit =
             (0..dataset.grid.joints()).filter(|other| dataset.grid.axes[*other].unit == dataset.grid.axes[joint].unit);
@@ -230,10 +251,11 @@ impl Slice {
                 format!("q{} {} = {} {}", subscript(joint + 1), axis.name, ticks::number(q[joint], 3), axis.unit)
             })
             .collect();
-        if fixed.is_empty() {
-            return "the whole grid".to_owned();
+        let mut text = if fixed.is_empty() { "the whole grid".to_owned() } else { format!("at {}", fixed.join(", ")) };
+        if (0..dataset.grid.joints()).any(|joint| self.end(dataset, joint).1) {
+            text += "; colours end where all but 2 % of the cells do";
         }
-        format!("at {}", fixed.join(", "))
+        text
     }
 
     fn legend(&self, canvas: &mut Canvas, dataset: &Dataset) {

@@ -104,8 +104,9 @@ fn caption(dataset: &Dataset, shown: &[usize]) -> String {
         });
         text += &format!(", {} of them at {}", ticks::thousands(shown.len()), fixed.collect::<Vec<_>>().join(", "));
     }
-    if is_mixed(dataset) {
-        text += "; torque of the revolute joints";
+    if all > 0 {
+        text += "; colour, on a root scale, and size by torque";
+        text += if is_mixed(dataset) { " of the revolute joints" } else { "" };
     }
     text
 }

@@ -67,7 +67,13 @@ pub fn identify_friction(log: &ScanLog, spec: &ScanSpec, chain: &Chain) -> Optio
         }
     }
     let deviation = if count > 1.0 { (squares / (count - 1.0)).sqrt() } else { 0.0 };
-    (mean > 0.0).then_some(IdentifiedFriction { coefficient: mean, strokes: count as usize, deviation })
+    (mean > 0.0).then_some(IdentifiedFriction {
+        coefficient: mean,
+        strokes: count as usize,
+        deviation,
+        stiffness: None,
+        predicted: Vec::new(),
+    })
 }
 
 /// Gives `dataset` how the node `node` of `chain` slips, which alone touches.

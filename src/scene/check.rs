@@ -1,10 +1,10 @@
 //! The text of a scene file, read and checked; each failure names the place.
 
-use super::error::{Diagnostic, SceneError, find};
 use super::value::KEY;
 use super::{JointKind, JointSpec, ProxySpec};
-use crate::JointVector;
+use crate::{Error, ErrorKind, JointVector};
 use serde::de::DeserializeOwned;
+use std::fmt::Display;
 use std::ops::Range;
 use std::path::Path;
 use toml::{
@@ -31,22 +31,22 @@ const REMOVED: [(&str, &str); 2] = [
 ];
 
 /// The text that is being checked.
-pub(super) struct Checker<'a> {
+pub(crate) struct Checker<'a> {
     pub path: &'a Path,
     pub text: &'a str,
 }
 
 impl Checker<'_> {
     /// An error at `span`.
-    pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> SceneError {
-        Diagnostic::new(self.path, self.text, span, message).into()
+    pub fn error(&self, span: Range<usize>, message: impl Display) -> Error {
+        Error::in_text(self.path, self.text, span, message).of(ErrorKind::Scene)
     }
 
     /// Reads the text.
     ///
     /// # Errors
     /// At the value that cannot be read.
-    pub fn read<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
+    pub fn read<T: DeserializeOwned>(&self) -> Result<T, Error> {
         let root = DeTable::parse(self.text);
         if let Ok(root) = &root {
             let lists = |path: &str| list(root.get_ref(), path.split('.'));
@@ -71,8 +71,8 @@ impl Checker<'_> {
 
     /// An error at what `path` names, keys and numbers of entries with dots between, or at the table around it that the
     /// text has.
-    pub fn at(&self, path: &str, message: impl Into<String>) -> SceneError {
-        Diagnostic::at(self.path, self.text, path, message).into()
+    pub fn at(&self, path: &str, message: impl Display) -> Error {
+        self.error(find(self.text, path).0, message)
     }
 
     /// Whether the text names what `path` names.
@@ -81,7 +81,7 @@ impl Checker<'_> {
     }
 
     /// Checks that the arm has a contact node of the number that stands at `path`.
-    pub fn node(&self, path: &str, node: Option<usize>, proxy: &ProxySpec) -> Result<(), SceneError> {
+    pub fn node(&self, path: &str, node: Option<usize>, proxy: &ProxySpec) -> Result<(), Error> {
         let nodes: usize = proxy.joints.iter().map(|joint| joint.nodes.len()).sum();
         match node {
             Some(node) if node >= nodes => {
@@ -101,7 +101,7 @@ impl Checker<'_> {
         list: &mut JointVector,
         joints: &[JointSpec],
         default: impl Fn(JointKind) -> f64,
-    ) -> Result<(), SceneError> {
+    ) -> Result<(), Error> {
         let key = path.rsplit('.').next().unwrap_or(path);
         let (found, needed) = (list.len(), joints.len());
         let mut fitted = JointVector::zeros(needed);
@@ -123,6 +123,20 @@ impl Checker<'_> {
         *list = fitted;
         Ok(())
     }
+}
+
+/// The place of what `key` names in a TOML text, keys and numbers of entries with dots between; where there is no such
+/// thing, that of the table around it, and false.
+fn find(text: &str, key: &str) -> (Range<usize>, bool) {
+    let Ok(root) = DeTable::parse(text) else { return (0..0, false) };
+    let root = DeValue::Table(root.into_inner());
+    let (mut place, mut value) = (0..0, &root);
+    for part in key.split('.') {
+        let inner = part.parse::<usize>().map_or_else(|_| value.get(part), |number| value.get(number));
+        let Some(inner) = inner else { return (place, false) };
+        (place, value) = (inner.span(), inner.get_ref());
+    }
+    (place, true)
 }
 
 /// The key in `table` of the value at a byte of the text.

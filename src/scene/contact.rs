@@ -1,10 +1,11 @@
 //! `[contact]`: equation (2) and how it is solved.
 
+use super::ProxySpec;
 use super::check::Checker;
 use super::value::{KEY, Range, defaults, positive, share};
-use super::{ProxySpec, SceneError};
+use crate::Error;
 use clap::ValueEnum;
-use serde::de::{Deserialize, Deserializer, Error, IgnoredAny};
+use serde::de::{Deserialize, Deserializer, Error as _, IgnoredAny};
 
 /// Names that are those of no law any more, and what to do about it; datasets of them are still felt.
 const FORMER_LAWS: [(&str, &str); 2] = [
@@ -153,7 +154,7 @@ fn number_or_rigid<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error>
 
 impl ContactTable {
     /// Checks it against the arm, and gives the surface and the stiffness that it leaves out.
-    pub fn check(self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<ContactSpec, SceneError> {
+    pub fn check(self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<ContactSpec, Error> {
         let nodes = || proxy.joints.iter().flat_map(|joint| &joint.nodes);
         let error = |key: &str, message: &str| Err(checker.at(&format!("contact.{key}"), message));
         if self.updates.is_some() {

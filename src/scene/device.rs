@@ -1,10 +1,11 @@
 //! `[device]`: how a real haptic device stands to the scene's arm.
 
+use super::ProxySpec;
 use super::check::Checker;
 use super::value::{KEY, Range, coordinates, not_negative, positive};
-use super::{ProxySpec, SceneError};
+use crate::Error;
 use crate::JointVector;
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, Deserializer, Error as _};
 
 /// How the coordinates of a real device become those of the scene, and how its tip holds the arm. Which device it is,
 /// is said on the command line: any device with such coordinates will do.
@@ -47,7 +48,7 @@ const TIP_DAMPING: f64 = 0.5;
 
 impl DeviceSpec {
     /// Checks it against the arm.
-    pub(super) fn check(&self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<(), SceneError> {
+    pub(super) fn check(&self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<(), Error> {
         checker.node("device.node", self.node, proxy)
     }
 }

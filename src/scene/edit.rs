@@ -1,7 +1,7 @@
 //! Changes of a scene's text that leave its other lines, and their comments, as a person wrote them.
 
-use super::SceneError;
 use super::check::Checker;
+use crate::Error;
 use glam::DVec3;
 use std::path::Path;
 use toml_edit::{DocumentMut, Item, Value};
@@ -17,7 +17,7 @@ impl<'a> SceneText<'a> {
     ///
     /// # Errors
     /// When it is no TOML; the message names the line.
-    pub fn new(text: &str, path: &'a Path) -> Result<Self, SceneError> {
+    pub fn new(text: &str, path: &'a Path) -> Result<Self, Error> {
         let document = text.parse().map_err(|error: toml_edit::TomlError| {
             Checker { path, text }.error(error.span().unwrap_or(0..0), error.message())
         })?;
@@ -28,7 +28,7 @@ impl<'a> SceneText<'a> {
     ///
     /// # Errors
     /// When `tables` are no TOML.
-    pub fn replace(&mut self, tables: &str) -> Result<(), SceneError> {
+    pub fn replace(&mut self, tables: &str) -> Result<(), Error> {
         let new = Self::new(tables, self.path)?.document;
         for (name, mut item) in new.into_table() {
             let old = self.document.remove(&name);

@@ -2,7 +2,8 @@
 //! them out, for pricing them, for turning them on and off while one feels, and for proving that what is not named is
 //! not there.
 
-use super::{GraphicsEffects, HapticsSpec, ProxyInertia, Scene, SceneError};
+use super::{GraphicsEffects, HapticsSpec, ProxyInertia, Scene};
+use crate::Error;
 use toml::{Table, Value};
 
 /// An effect of a loop: absent unless the scene names it.
@@ -181,7 +182,7 @@ impl Scene {
     ///
     /// # Errors
     /// When the effects cannot act here, or not together.
-    pub fn with_effects(&self, graphics: bool, effects: &[Effect]) -> Result<Self, SceneError> {
+    pub fn with_effects(&self, graphics: bool, effects: &[Effect]) -> Result<Self, Error> {
         let mut text = table_of(self);
         if !graphics {
             text.insert("graphics".into(), false.into());

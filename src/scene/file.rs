@@ -7,9 +7,8 @@ use super::grid::GridTable;
 use super::object::ObjectTable;
 use super::proxy::ProxyTable;
 use super::scan::ScanTable;
-use super::{
-    DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene, SceneError, shape,
-};
+use super::{DeviceSpec, GraphicsSpec, HapticsSpec, Interpolation, MotionSpec, Rendering, ScanScene, Scene, shape};
+use crate::Error;
 use crate::names;
 use serde::Deserialize;
 use std::mem::take;
@@ -34,7 +33,7 @@ pub(super) struct SceneTable {
 }
 
 /// Validates `table`, read from the checker's text, as a scene with a virtual object.
-pub(super) fn scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<Scene, SceneError> {
+pub(super) fn scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<Scene, Error> {
     let rendering = rendering(checker, &mut table)?;
     let (Some(object), Some(contact)) = (rendering.object, table.contact) else {
         let message = "the scene needs [object] and [contact] to be baked; a scene of a real object, with [scan], is \
@@ -48,7 +47,7 @@ pub(super) fn scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<Scen
 }
 
 /// Validates `table` as a scene with a real object.
-pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<ScanScene, SceneError> {
+pub(super) fn scan_scene(checker: &Checker<'_>, mut table: SceneTable) -> Result<ScanScene, Error> {
     let Some(scan) = table.scan.take() else {
         let message = "the scene has no [scan]: it says nothing of how a real object is haptized; a virtual one is \
                        haptized by `haptize bake`";
@@ -73,7 +72,7 @@ pub const LINEAR_RELAXATION: &str = "relaxation acts on the root of the object's
      virtual object";
 
 /// Validates what rendering needs of `table`, and takes it.
-pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result<Rendering, SceneError> {
+pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result<Rendering, Error> {
     let proxy = table.proxy.check(checker)?;
     let joints = &proxy.joints;
     let mut object = take(&mut table.object);

@@ -2,9 +2,10 @@
 
 use super::check::Checker;
 use super::value::{KEY, Range, positive, vector};
-use super::{Material, ObjectSpec, SceneError};
+use super::{Material, ObjectSpec};
+use crate::Error;
 use glam::DVec3;
-use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor, value::MapAccessDeserializer};
+use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor, value::MapAccessDeserializer};
 
 /// Lowest frame rate (Hz): motion is no longer seen long before.
 const LOWEST_RATE: f64 = 1.0;
@@ -74,7 +75,7 @@ impl Default for GraphicsSpec {
 
 impl GraphicsSpec {
     /// Checks it against the virtual object, which the effects act on, where the scene has one.
-    pub(super) fn check(&self, checker: &Checker<'_>, object: Option<&ObjectSpec>) -> Result<(), SceneError> {
+    pub(super) fn check(&self, checker: &Checker<'_>, object: Option<&ObjectSpec>) -> Result<(), Error> {
         let Some(object) = object else {
             return self.effects.named().map_or(Ok(()), |key| {
                 let message = format!("{key} acts on the virtual object, and the scene has none: leave it out");

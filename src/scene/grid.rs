@@ -3,9 +3,10 @@
 //! Without `axes`, every joint's range between its limits is cut into steps of `spacing`. An axis gives its start and
 //! two of step (default: `spacing`), stop and count.
 
+use super::JointSpec;
 use super::check::Checker;
 use super::value::{count, finite, positive};
-use super::{JointSpec, SceneError};
+use crate::Error;
 use crate::MAX_AXES;
 use serde::Deserialize;
 
@@ -63,7 +64,7 @@ struct AxisTable {
 
 impl GridTable {
     /// The grid, which stands at `path` in the text, for an arm with `joints`.
-    pub fn check(&self, checker: &Checker<'_>, path: &str, joints: &[JointSpec]) -> Result<GridSpec, SceneError> {
+    pub fn check(&self, checker: &Checker<'_>, path: &str, joints: &[JointSpec]) -> Result<GridSpec, Error> {
         let at = |message: String| checker.at(path, message);
         if joints.len() > MAX_AXES {
             return Err(at(format!(

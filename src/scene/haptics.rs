@@ -6,10 +6,11 @@
 use super::check::Checker;
 use super::gains::{GAINS, OF_THE_DEVICE, OF_THE_HAND};
 use super::value::{KEY, Range, defaults, gains, positive, positive_gains, share};
-use super::{JointSpec, RelaxationSpec, SceneError};
+use super::{JointSpec, RelaxationSpec};
+use crate::Error;
 use crate::JointVector;
 use serde::Deserialize;
-use serde::de::{Deserializer, Error};
+use serde::de::{Deserializer, Error as _};
 
 /// Greatest time between two ticks (s): a whole period of a hand's fastest motion, 10 Hz. After more, the position
 /// before says nothing about the velocity.
@@ -234,7 +235,7 @@ impl HapticsSpec {
     }
 
     /// Fits it to the arm's `joints`, and checks it.
-    pub(super) fn check(&mut self, checker: &Checker<'_>, joints: &[JointSpec]) -> Result<(), SceneError> {
+    pub(super) fn check(&mut self, checker: &Checker<'_>, joints: &[JointSpec]) -> Result<(), Error> {
         self.proxy_damping_is_free = self.proxy_damping.is_empty();
         let gains = GAINS.into_iter().map(|(list, _)| list).chain(OF_THE_DEVICE).map(|list| ("haptics", list));
         for (table, (key, list, default)) in gains.chain(OF_THE_HAND.map(|list| ("haptics.hand", list))) {

@@ -9,7 +9,6 @@ mod device;
 mod edit;
 mod effects;
 mod effort;
-mod error;
 mod file;
 mod gains;
 mod graphics;
@@ -32,7 +31,6 @@ pub use device::DeviceSpec;
 pub use edit::SceneText;
 pub use effects::{EFFECTS, Effect, Tuning};
 pub use effort::{EffortNorm, NormUnit, effort_norms, effort_unit, efforts};
-pub use error::{Diagnostic, SceneError};
 pub(crate) use file::LINEAR_RELAXATION;
 pub use graphics::{GraphicsEffects, GraphicsSpec, StiffeningSpec};
 pub use grid::{AxisSpec, GRID_LINE, GRID_STEP_SLACK, GridSpec};
@@ -55,8 +53,8 @@ pub use skin::SkinSpec;
 
 pub(crate) use inertia::positive_semidefinite;
 
-use crate::names;
-use check::Checker;
+use crate::{Error, ErrorKind, names};
+pub(crate) use check::Checker;
 use clap::ValueEnum as _;
 use std::path::{Path, PathBuf};
 
@@ -131,7 +129,7 @@ impl Scene {
     ///
     /// # Errors
     /// When a file cannot be read, or the scene is not valid; the message names the line and the remedy.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let text = read_text(path)?;
         let scene = Self::parse(&text, path)?;
@@ -165,7 +163,7 @@ impl Scene {
     ///
     /// # Errors
     /// When the scene is not valid; the message names the line and the remedy.
-    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, Error> {
         let checker = Checker { path: path.as_ref(), text };
         file::scene(&checker, checker.read()?)
     }
@@ -174,7 +172,7 @@ impl Scene {
     ///
     /// # Errors
     /// When the scene is not valid, or the law was removed; the message names the remedy.
-    pub fn of_dataset(text: &str, path: impl AsRef<Path>, law: &str) -> Result<Self, SceneError> {
+    pub fn of_dataset(text: &str, path: impl AsRef<Path>, law: &str) -> Result<Self, Error> {
         let mut scene = Self::parse(text, &path)?;
         scene.contact.law = ContactLaw::from_str(law, true).map_err(|_| {
             let message =
@@ -190,7 +188,7 @@ impl ScanScene {
     ///
     /// # Errors
     /// When the file cannot be read, or has no valid `[scan]`; the message names the line and the remedy.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         Self::parse(&read_text(path)?, path)
     }
@@ -199,7 +197,7 @@ impl ScanScene {
     ///
     /// # Errors
     /// When the scene has no valid `[scan]`; the message names the line and the remedy.
-    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, Error> {
         let checker = Checker { path: path.as_ref(), text };
         file::scan_scene(&checker, checker.read()?)
     }
@@ -210,7 +208,7 @@ impl Rendering {
     ///
     /// # Errors
     /// When the file cannot be read, or the scene is not valid; the message names the line and the remedy.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         Self::parse(&read_text(path)?, path)
     }
@@ -219,13 +217,14 @@ impl Rendering {
     ///
     /// # Errors
     /// When the scene is not valid; the message names the line and the remedy.
-    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Self, Error> {
         let checker = Checker { path: path.as_ref(), text };
         file::rendering(&checker, &mut checker.read()?)
     }
 }
 
 /// The text of the scene file at `path`.
-fn read_text(path: &Path) -> Result<String, SceneError> {
-    text::read(path).map_err(|reason| SceneError::Unreadable { path: path.to_owned(), reason })
+fn read_text(path: &Path) -> Result<String, Error> {
+    let unreadable = |reason| Error::at(path, format_args!("cannot read the scene: {reason}")).of(ErrorKind::File);
+    text::read(path).map_err(unreadable)
 }

@@ -1,10 +1,11 @@
 //! `[motion]`: named motions of the hand.
 
+use super::JointSpec;
 use super::check::Checker;
 use super::value::{KEY, coordinates, not_negative};
-use super::{JointSpec, SceneError};
+use crate::Error;
 use crate::JointVector;
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, Deserializer, Error as _};
 
 /// Named motions of the hand, as waypoints in C-space.
 #[derive(Clone, Debug, Default, PartialEq, serde::Deserialize)]
@@ -32,7 +33,7 @@ pub struct Waypoint {
 
 impl MotionSpec {
     /// Checks it against the arm's `joints`.
-    pub(super) fn check(&self, checker: &Checker<'_>, joints: &[JointSpec]) -> Result<(), SceneError> {
+    pub(super) fn check(&self, checker: &Checker<'_>, joints: &[JointSpec]) -> Result<(), Error> {
         for (key, waypoints) in [("press", &self.press), ("scrape", &self.scrape)] {
             for (number, waypoint) in waypoints.iter().enumerate() {
                 let at = |part, message: String| Err(checker.at(&format!("motion.{key}.{number}.{part}"), message));

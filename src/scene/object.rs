@@ -1,11 +1,12 @@
 //! `[object]`: shape, material, ground.
 
+use super::RelaxationSpec;
 use super::check::Checker;
 use super::skin::{SkinSpec, SkinTable};
 use super::value::{KEY, Range, count, defaults, finite, not_negative, positive, rotation, vector};
-use super::{RelaxationSpec, SceneError};
+use crate::Error;
 use glam::DVec3;
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, Deserializer, Error as _};
 use std::path::PathBuf;
 
 /// Most rings, and most nodes of a ring: their product must fit the node numbers; what memory allows is far less, and
@@ -377,7 +378,7 @@ impl ObjectTable {
     }
 
     /// The object.
-    pub fn check(self, checker: &Checker<'_>) -> Result<ObjectSpec, SceneError> {
+    pub fn check(self, checker: &Checker<'_>) -> Result<ObjectSpec, Error> {
         let Self { sphere, mesh, tetrahedra, springs, elasticity, skin, ground, node_mass, node_damping, .. } = self;
         let folder = checker.path.parent().unwrap_or(checker.path);
         let is_solid = tetrahedra.is_some();
@@ -428,7 +429,7 @@ impl ObjectTable {
 }
 
 impl SphereTable {
-    fn check(self, checker: &Checker<'_>) -> Result<Shape, SceneError> {
+    fn check(self, checker: &Checker<'_>) -> Result<Shape, Error> {
         let Self { centre, radius, .. } = self;
         match (self.rings, self.segments, self.subdivisions, self.edge) {
             (Some(rings), Some(segments), None, None) => Ok(Shape::Sphere { centre, radius, rings, segments }),
@@ -454,7 +455,7 @@ impl SphereTable {
 
 impl ElasticityTable {
     /// `is_solid`: whether the shape is the tetrahedra of a Gmsh file.
-    fn check(self, checker: &Checker<'_>, is_solid: bool) -> Result<ElasticSpec, SceneError> {
+    fn check(self, checker: &Checker<'_>, is_solid: bool) -> Result<ElasticSpec, Error> {
         let Self { young, poisson, cell, inclusion } = self;
         if cell.is_some() && is_solid {
             return Err(checker.at("object.elasticity.cell", "tetrahedra are solid already: leave cell out"));
@@ -483,7 +484,7 @@ impl ElasticityTable {
 }
 
 impl GroundTable {
-    fn check(self, checker: &Checker<'_>, material: &Material) -> Result<GroundSpec, SceneError> {
+    fn check(self, checker: &Checker<'_>, material: &Material) -> Result<GroundSpec, Error> {
         let stiffness = match (self.stiffness, self.per_area, self.per_volume, self.clamp) {
             (Some(k), None, None, false) => GroundStiffness::PerNode(k),
             (None, Some(k), None, false) => GroundStiffness::PerArea(k),

@@ -1,7 +1,8 @@
 //! A scene's text brought to what the scene has become, so that a dataset's scene says what was baked.
 
 use super::contact::LAW_KEYS;
-use super::{AxisSpec, Scene, SceneError};
+use super::{AxisSpec, Scene};
+use crate::Error;
 use toml::{Table, Value};
 
 impl Scene {
@@ -10,7 +11,7 @@ impl Scene {
     ///
     /// # Errors
     /// When that makes no scene.
-    pub fn with_own_text(&self) -> Result<Self, SceneError> {
+    pub fn with_own_text(&self) -> Result<Self, Error> {
         let mut text: Table = self.text.parse().unwrap_or_default();
         let axis = |axis: &AxisSpec| {
             let mut table = Table::new();

@@ -1,13 +1,14 @@
 //! `[[proxy.joint]]`: the chain, link by link.
 
+use super::GRID_LINE;
 use super::check::Checker;
 use super::inertia::positive_semidefinite;
 use super::shape::ShapeTable;
 use super::value::{KEY, Range, count, direction, interval, not_negative, positive, vector};
-use super::{GRID_LINE, SceneError};
+use crate::Error;
 use crate::MAX_JOINTS;
 use glam::{DMat3, DVec3};
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, Deserializer, Error as _};
 
 /// Default reflected inertia of the actuator of a revolute joint, that of a desktop device (kg m^2).
 const ROTOR_INERTIA: f64 = 1e-3;
@@ -111,7 +112,7 @@ pub(super) struct ProxyTable {
 
 impl ProxyTable {
     /// Takes the arm, and gives names and inertias to joints that the text gives none.
-    pub fn check(&mut self, checker: &Checker<'_>) -> Result<ProxySpec, SceneError> {
+    pub fn check(&mut self, checker: &Checker<'_>) -> Result<ProxySpec, Error> {
         let mut joints = std::mem::take(&mut self.joint);
         let at = |message| Err(checker.at("proxy.joint", message));
         if joints.is_empty() || joints.len() > MAX_JOINTS {

@@ -1,8 +1,8 @@
 //! `[object.relaxation]`: how the object's force fades while it is held.
 
-use super::SceneError;
 use super::check::Checker;
 use super::value::{Range, positive};
+use crate::Error;
 use serde::Deserialize;
 
 /// Most terms of a relaxation (1): two fit ten seconds of real tissue to 2 %.
@@ -22,13 +22,13 @@ pub struct RelaxationSpec {
 
 impl RelaxationSpec {
     /// Checks it.
-    pub(super) fn check(self, checker: &Checker<'_>) -> Result<Self, SceneError> {
+    pub(super) fn check(self, checker: &Checker<'_>) -> Result<Self, Error> {
         self.check_terms(checker, "object.relaxation.terms")?;
         Ok(self)
     }
 
     /// Checks its terms, which stand at `key`.
-    pub(super) fn check_terms(&self, checker: &Checker<'_>, key: &str) -> Result<(), SceneError> {
+    pub(super) fn check_terms(&self, checker: &Checker<'_>, key: &str) -> Result<(), Error> {
         let at = |message: String| Err(checker.at(key, message));
         if self.terms.is_empty() || self.terms.len() > MOST_TERMS {
             return at(format!("terms lists {} terms: it must list 1 to {MOST_TERMS}", self.terms.len()));

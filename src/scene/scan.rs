@@ -6,10 +6,11 @@ use super::grid::GridTable;
 use super::value::{
     KEY, Range, count, defaults, direction, edges, gains, not_negative, positive, positive_gains, vector,
 };
-use super::{GridSpec, JointKind, ProxySpec, RelaxationSpec, SceneError};
+use super::{GridSpec, JointKind, ProxySpec, RelaxationSpec};
+use crate::Error;
 use crate::JointVector;
 use glam::DVec3;
-use serde::de::{Deserialize, Deserializer, Error};
+use serde::de::{Deserialize, Deserializer, Error as _};
 
 /// Most positions along one axis of a plan.
 const MOST: usize = 100_000;
@@ -236,7 +237,7 @@ pub(super) struct ScanTable {
 
 impl ScanTable {
     /// The scan for the arm `proxy`.
-    pub fn check(self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<ScanSpec, SceneError> {
+    pub fn check(self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<ScanSpec, Error> {
         let Self { workspace, joints, mut control, history, mut limits, simulated } = self;
         let plan = match (workspace, joints) {
             (Some(plan), None) => {

@@ -1,8 +1,9 @@
 //! Shapes of links: drawn, not felt. Nothing that is solved depends on them.
 
+use super::JointSpec;
 use super::check::Checker;
 use super::value::{edges, positive, rotation, vector};
-use super::{JointSpec, SceneError};
+use crate::Error;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use glam::{DAffine3, DVec3};
 
@@ -161,7 +162,7 @@ pub(super) fn check(
     checker: &Checker<'_>,
     tables: Vec<ShapeTable>,
     joints: &[JointSpec],
-) -> Result<Vec<LinkShape>, SceneError> {
+) -> Result<Vec<LinkShape>, Error> {
     if tables.len() > MAX_SHAPES {
         let message = format!("the arm has more than {MAX_SHAPES} shapes: leave some out");
         return Err(checker.at(&format!("proxy.shape.{MAX_SHAPES}"), message));
@@ -171,7 +172,7 @@ pub(super) fn check(
 }
 
 impl ShapeTable {
-    fn check(self, checker: &Checker<'_>, path: &str, joints: &[JointSpec]) -> Result<LinkShape, SceneError> {
+    fn check(self, checker: &Checker<'_>, path: &str, joints: &[JointSpec]) -> Result<LinkShape, Error> {
         let number = |name: String| {
             joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
                 let names: Vec<&str> = joints.iter().map(|joint| joint.name.as_str()).collect();

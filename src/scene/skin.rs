@@ -13,7 +13,8 @@
 
 use super::check::Checker;
 use super::value::{Range, positive};
-use super::{ElasticSpec, Material, SceneError};
+use super::{ElasticSpec, Material};
+use crate::Error;
 use serde::{Deserialize, Deserializer};
 
 /// Default Poisson's ratio of a skin: rubber and living tissue hardly change their volume, and a plate's formulas hold
@@ -59,7 +60,7 @@ fn up_to_half<'de, D: Deserializer<'de>>(value: D) -> Result<Option<f64>, D::Err
 
 impl SkinTable {
     /// The skin on `material`.
-    pub fn check(self, checker: &Checker<'_>, material: &Material) -> Result<SkinSpec, SceneError> {
+    pub fn check(self, checker: &Checker<'_>, material: &Material) -> Result<SkinSpec, Error> {
         let at = |key: &str, message: &str| Err(checker.at(&format!("object.skin.{key}"), message));
         let foundation = self.foundation.unwrap_or(0.0);
         let (tension, bending) = match (self.thickness, self.young) {

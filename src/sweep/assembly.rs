@@ -7,14 +7,14 @@ use super::{
 };
 use crate::Error;
 use crate::dataset::{
-    self, Heading, RESULTS, Stored, Surface, Target, Tensor, TensorContents, surface_tensors, write_file,
+    self, Column, Element, Heading, RESULTS, Source, Stored, Surface, Tensor, TensorContents, surface_tensors,
+    write_file,
 };
-use bytemuck::Pod;
 use rayon::prelude::*;
 use std::{
-    collections::TryReserveError,
     io::{self, Write},
     ops::Range,
+    path::Path,
     sync::atomic::{AtomicBool, Ordering},
 };
 
@@ -41,7 +41,7 @@ impl<'a> Results<'a> {
     /// The results of all `points` points in `table`, as they go into a file of `shape`.
     pub fn new(table: &'a Table<'a>, points: usize, shape: Shape, stop: &'a AtomicBool) -> Self {
         let mut results = Self { table, points, shape, before: Vec::new(), stop };
-        if shape.with_forces {
+        if shape.extras.forces {
             results.before = results.contacts_before();
         }
         results
@@ -64,21 +64,7 @@ impl<'a> Results<'a> {
 
     /// Bytes of an entry of a column.
     fn size(&self, array: Stored) -> usize {
-        self.shape.width().bytes(array)
-    }
-
-    /// A column of all points, that of the ends of rows behind a 0, in memory; an error where there is none.
-    pub fn column<T: Pod>(&self, array: Stored) -> Result<Vec<T>, TryReserveError> {
-        let mut numbers = Vec::new();
-        numbers.try_reserve_exact(self.bytes(array) / size_of::<T>())?;
-        numbers.resize(self.bytes(array) / size_of::<T>(), T::zeroed());
-        let mut rest = bytemuck::cast_slice_mut(&mut numbers);
-        let contents = Contents::Results(self, array);
-        for piece in 0..self.points.div_ceil(PIECE) {
-            // What is written is as long as the column.
-            let _ = contents.write(piece, &mut rest);
-        }
-        Ok(numbers)
+        self.shape.bytes(array)
     }
 
     /// Bytes of a column in the file.
@@ -92,13 +78,32 @@ impl<'a> Results<'a> {
     }
 
     /// Writes all points as the dataset `output`.
-    pub fn assemble(&self, output: Target<'_>, heading: Heading<'_>, surface: &Surface) -> Result<(), Error> {
+    pub fn assemble(&self, output: &Path, heading: Heading<'_>, surface: &Surface) -> Result<(), Error> {
         let tensor =
             |array: Stored| Tensor::stored(array, heading.grid, self.bytes(array), Contents::Results(self, array));
-        let stored = RESULTS.into_iter().filter(|array| self.shape.has(*array));
+        let stored = RESULTS.into_iter().filter(|array| self.shape.extras.store(*array));
         let mut tensors: Vec<_> = stored.map(tensor).collect();
         tensors.extend(surface_tensors(heading.grid, surface).into_iter().map(|tensor| tensor.map(Contents::Held)));
         write_file(output, heading, tensors)
+    }
+}
+
+/// Columns of all points in memory.
+impl Source for Results<'_> {
+    fn take<T: Element>(&mut self, array: Stored) -> Result<Option<Column<T>>, String> {
+        if !RESULTS.contains(&array) || !self.shape.extras.store(array) {
+            return Ok(None);
+        }
+        let (mut numbers, count) = (Vec::new(), self.bytes(array) / size_of::<T>());
+        numbers.try_reserve_exact(count).map_err(|why| why.to_string())?;
+        numbers.resize(count, T::zeroed());
+        let mut rest = bytemuck::cast_slice_mut(&mut numbers);
+        let contents = Contents::Results(self, array);
+        for piece in 0..self.points.div_ceil(PIECE) {
+            // What is written is as long as the column.
+            let _ = contents.write(piece, &mut rest);
+        }
+        Ok(Some(numbers.into()))
     }
 }
 

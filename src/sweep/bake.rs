@@ -98,7 +98,7 @@ impl Bake<'_> {
     ) -> Result<T, Error> {
         self.prepared(|sweep, backend, run| {
             if sweep.forecast.is_none() {
-                let is_timed = matches!(backend, ChosenBackend::Cpu(_));
+                let is_timed = backend.is_cpu_alone();
                 sweep.predict(backend, is_timed)?;
             }
             sweep_with(sweep, backend, run)

@@ -1,9 +1,9 @@
 //! Which backend solves: one place for `bake`, the demo and programs that use this library.
 
-use super::{Backend, CpuBackend, WithFallback};
+use super::WithFallback;
 use crate::{
-    Error, JointVector,
-    contact::{Equilibrium, Model, Work},
+    Error,
+    contact::Model,
     error,
     gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver, asked_for, named_adapters},
     memory,
@@ -39,18 +39,9 @@ pub(crate) fn is_worth_a_gpu(seconds: f64) -> bool {
     seconds > GPU_START
 }
 
-/// The backend that was chosen.
-pub enum ChosenBackend<'a> {
-    /// All cores, f64.
-    Cpu(CpuBackend<'a>),
-    /// Thousands of configurations at a time, f32; the CPU once a device is lost for good.
-    Gpu {
-        /// Backend that solves.
-        solver: Box<WithFallback<'a, GpuSolver<'a>>>,
-        /// A good number of configurations for one call.
-        chunk: usize,
-    },
-}
+/// The backend that was chosen: GPUs, thousands of configurations at a time, f32, and the CPU once they are lost for
+/// good; or the CPU alone, all cores, f64.
+pub type ChosenBackend<'a> = WithFallback<'a, GpuSolver<'a>>;
 
 /// Memory of a thread (bytes): the 2 MiB of its stack, and half as much for what the system and Rust add at its start,
 /// which ends the process where it does not fit.
@@ -63,24 +54,24 @@ impl<'a> ChosenBackend<'a> {
     /// When there is none such, or it cannot be opened.
     pub fn open(choice: BackendChoice, model: &'a Model<'a>) -> Result<Self, Error> {
         match choice {
-            BackendChoice::Cpu => Self::cpu(model),
+            BackendChoice::Cpu => Self::on_cpu(model),
             // No GPU takes it, so that none needs to be opened.
-            BackendChoice::Auto if model.contact.law != ContactLaw::Rest => Self::cpu(model),
+            BackendChoice::Auto if model.contact.law != ContactLaw::Rest => Self::on_cpu(model),
             BackendChoice::Gpu => Ok(Self::gpu(AdapterChoice::Any, model)?),
             BackendChoice::Auto => match Self::gpu(AdapterChoice::Hardware, model) {
                 // Who names an adapter that is not there would not notice that the CPU took its place.
                 Err(error @ GpuError::NoAdapter { .. }) if is_named_in_vain() => Err(error.into()),
                 // Where the GPU cannot take the scene the CPU can.
-                opened => opened.or_else(|_| Self::cpu(model)),
+                opened => opened.or_else(|_| Self::on_cpu(model)),
             },
         }
     }
 
-    fn cpu(model: &'a Model<'a>) -> Result<Self, Error> {
+    fn on_cpu(model: &'a Model<'a>) -> Result<Self, Error> {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         memory::check(threads * THREAD_MEMORY)
             .map_err(|shortage| error!("no memory for threads to solve on: {shortage}"))?;
-        Ok(Self::Cpu(CpuBackend::new(model, 0)?))
+        Self::cpu_alone(model)
     }
 
     fn gpu(choice: AdapterChoice, model: &'a Model<'a>) -> Result<Self, GpuError> {
@@ -91,35 +82,14 @@ impl<'a> ChosenBackend<'a> {
     /// Devices that are open already, to solve `model`, with the CPU behind them.
     #[must_use]
     pub fn on(devices: GpuSolver<'a>, model: &'a Model<'a>) -> Self {
-        let (chunk, name) = (devices.chunk(), counted(devices.adapters().map(ToString::to_string)));
-        Self::Gpu { solver: Box::new(WithFallback::new(devices, name, model)), chunk }
-    }
-
-    /// `cpu` or `gpu`, as a dataset's provenance says it.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Cpu(_) => "cpu",
-            Self::Gpu { .. } => "gpu",
-        }
-    }
-
-    /// Returns the backend's name as a dataset's provenance states it.
-    #[must_use]
-    pub fn adapter(&self) -> String {
-        match self {
-            Self::Cpu(_) => CpuBackend::adapter(),
-            Self::Gpu { solver, .. } => solver.name().to_owned(),
-        }
+        let name = counted(devices.adapters().map(ToString::to_string));
+        Self::new(devices, name, model)
     }
 
     /// A good [`super::Run::chunk`] for this backend.
     #[must_use]
     pub fn chunk(&self) -> usize {
-        match self {
-            Self::Cpu(cpu) => cpu.chunk(),
-            Self::Gpu { chunk, .. } => *chunk,
-        }
+        self.chunk_of(GpuSolver::chunk)
     }
 }
 
@@ -149,45 +119,6 @@ fn counted(names: impl Iterator<Item = String>) -> String {
     }
     let told = counts.into_iter().map(|(name, count)| if count > 1 { format!("{count} x {name}") } else { name });
     told.collect::<Vec<_>>().join("; ")
-}
-
-impl Backend for ChosenBackend<'_> {
-    type Error = Error;
-
-    fn solve(&mut self, configurations: &[JointVector]) -> Result<Vec<Equilibrium>, Self::Error> {
-        match self {
-            Self::Cpu(cpu) => cpu.solve(configurations).map_err(|never| match never {}),
-            Self::Gpu { solver, .. } => Ok(solver.solve(configurations)?),
-        }
-    }
-
-    fn stream(&mut self, work: &mut dyn Work) -> Result<(), Self::Error> {
-        match self {
-            Self::Cpu(cpu) => cpu.stream(work).map_err(|never| match never {}),
-            Self::Gpu { solver, .. } => Ok(solver.stream(work)?),
-        }
-    }
-
-    fn notices(&mut self) -> Vec<String> {
-        match self {
-            Self::Cpu(cpu) => cpu.notices(),
-            Self::Gpu { solver, .. } => solver.notices(),
-        }
-    }
-
-    fn threads(&self) -> usize {
-        match self {
-            Self::Cpu(cpu) => cpu.threads(),
-            Self::Gpu { solver, .. } => solver.threads(),
-        }
-    }
-
-    fn left_to_cpu(&self) -> usize {
-        match self {
-            Self::Cpu(cpu) => cpu.left_to_cpu(),
-            Self::Gpu { solver, .. } => solver.left_to_cpu(),
-        }
-    }
 }
 
 #[cfg(test)]

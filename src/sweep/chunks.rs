@@ -252,7 +252,6 @@ impl Sweep<'_> {
             footprint,
             skipped_points: course.skipped,
             resumed_points: resumed,
-            solved_points: course.tally.points - resumed,
             left_to_cpu: backend.left_to_cpu() - left_before,
             lowered: None,
             solving: start.elapsed(),

@@ -1,4 +1,4 @@
-//! A backend on a device that may fail for good, and the CPU in its place from then on.
+//! A backend on a device that may fail for good, and the CPU in its place from then on; or the CPU alone.
 //!
 //! A GPU is lost by a driver's reset, by sleep, by being pulled out, or by other programs that take its memory. Its
 //! solver first tries again with smaller batches, and then goes on with its other devices; what it cannot mend ends
@@ -18,7 +18,7 @@ pub struct WithFallback<'a, B> {
     /// `None` once it has failed.
     device: Option<B>,
     cpu: Option<CpuBackend<'a>>,
-    /// Name of the device.
+    /// Name of the device; empty where there never was one.
     name: String,
     notices: Vec<String>,
     /// By the device, before it failed.
@@ -31,14 +31,38 @@ impl<'a, B: Backend> WithFallback<'a, B> {
         Self { model, device: Some(device), cpu: None, name: name.to_string(), notices: Vec::new(), left_to_cpu: 0 }
     }
 
-    /// Name of the device.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
+    /// The CPU alone, to solve `model`.
+    ///
+    /// # Errors
+    /// When the system gives no threads.
+    pub fn cpu_alone(model: &'a Model<'a>) -> Result<Self, Error> {
+        let cpu = Some(CpuBackend::new(model, 0)?);
+        Ok(Self { model, device: None, cpu, name: String::new(), notices: Vec::new(), left_to_cpu: 0 })
     }
-}
 
-impl<'a, B: Backend> WithFallback<'a, B> {
+    /// Whether there never was a device.
+    #[must_use]
+    pub fn is_cpu_alone(&self) -> bool {
+        self.name.is_empty()
+    }
+
+    /// `cpu` or `gpu`, as a dataset's provenance says it.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        if self.is_cpu_alone() { "cpu" } else { "gpu" }
+    }
+
+    /// Returns the backend's name as a dataset's provenance states it: that of the device, or of the CPU.
+    #[must_use]
+    pub fn adapter(&self) -> String {
+        if self.is_cpu_alone() { CpuBackend::adapter() } else { self.name.clone() }
+    }
+
+    /// A good [`super::Run::chunk`] for this backend, where its device has one of `chunk`.
+    pub(super) fn chunk_of(&self, chunk: impl FnOnce(&B) -> usize) -> usize {
+        self.device.as_ref().map_or_else(|| self.cpu.as_ref().map_or(1, CpuBackend::chunk), chunk)
+    }
+
     /// Leaves the device, which has failed. What it told on the way is told first.
     fn leave(&mut self, error: &B::Error) {
         self.left_to_cpu = self.left_to_cpu();
@@ -79,6 +103,11 @@ impl<B: Backend> Backend for WithFallback<'_, B> {
         }
         self.notices().into_iter().for_each(|notice| work.note(notice));
         self.cpu()?.stream(work).map_err(|never| match never {})
+    }
+
+    fn threads(&self) -> usize {
+        let of_cpu = || self.cpu.as_ref().map_or_else(rayon::current_num_threads, Backend::threads);
+        self.device.as_ref().map_or_else(of_cpu, Backend::threads)
     }
 
     fn notices(&mut self) -> Vec<String> {

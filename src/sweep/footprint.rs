@@ -38,8 +38,8 @@ impl Bounds {
 
 /// Results of `points` points at each of which `touching` nodes of the proxy touch (bytes).
 pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
-    let contacts = if shape.with_forces { node_forces(touching, shape) } else { 0 };
-    columns::size(points, shape.width(), points.saturating_mul(contacts))
+    let contacts = if shape.extras.forces { node_forces(touching, shape) } else { 0 };
+    columns::size(points, shape, points.saturating_mul(contacts))
 }
 
 /// Chunks on their way: `solved` configurations of each and their equilibria, and the columns of `points` points, and
@@ -48,8 +48,8 @@ pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape)
     // Lists grow by doubling.
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());
     let each = size_of::<JointVector>() + size_of::<Equilibrium>() + lists;
-    let contacts = if shape.with_forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
-    let kept = columns::size(points, shape.width(), contacts);
+    let contacts = if shape.extras.forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
+    let kept = columns::size(points, shape, contacts);
     let under_way = solved.saturating_mul(each).saturating_add(points.saturating_mul(size_of::<Option<f32>>()));
     under_way.saturating_mul(CHUNKS_IN_FLIGHT).saturating_add(kept.saturating_mul(1 + BEHIND))
 }

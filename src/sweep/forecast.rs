@@ -103,13 +103,13 @@ impl Sweep<'_> {
         let per_sample = points as f64 / sampled.max(1) as f64;
         let seconds = per_sample * solving;
         let bytes = |shape: Shape| {
-            let contacts = if shape.with_forces { (per_sample * contacts as f64).round() as usize } else { 0 };
-            columns::size(points, shape.width(), contacts)
+            let contacts = if shape.extras.forces { (per_sample * contacts as f64).round() as usize } else { 0 };
+            columns::size(points, shape, contacts)
         };
         Ok(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,
             seconds: is_timed.then_some(seconds),
-            disk: bytes(Shape { with_forces: self.with_forces, ..self.shape }),
+            disk: bytes(self.stored()),
             part: bytes(self.shape),
             sampled,
         })

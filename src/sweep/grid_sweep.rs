@@ -8,7 +8,7 @@ use super::{
     assembly::{self, Results},
     chunks::{Begun, Solved, together},
     columns::{Columns, Shape},
-    error::{busy, in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
+    error::{in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
     footprint::{self, Bounds},
     lowest,
     measured::{ErrorCheck, MOST_CONFIGURATIONS},
@@ -20,13 +20,12 @@ use super::{
 use crate::{
     Error, MAX_AXES,
     contact::{MeshRipple, Model},
-    dataset::{self, Axis, Claim, Contacts, Dataset, Grid, Heading, Provenance, SlipColumns, Stored, Surface, Target},
+    dataset::{self, Axis, Dataset, Extras, Grid, Heading, Provenance, Surface},
     error, memory,
     object::{Object, Skin},
     scene::{HapticsSpec, Scene},
 };
 use std::{
-    collections::TryReserveError,
     ffi::OsString,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
@@ -79,7 +78,7 @@ pub struct Sweep<'a> {
     /// Whether the dataset holds contact forces.
     pub(super) with_forces: bool,
     /// The object's skin.
-    skin: Option<Skin>,
+    pub(super) skin: Option<Skin>,
     /// Warnings about the object.
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
@@ -126,9 +125,7 @@ impl<'a> Sweep<'a> {
             shape: Shape {
                 joints: grid.joints(),
                 surface_nodes: object.surface_nodes,
-                with_forces,
-                with_tangent: false,
-                with_slip: scene.haptics.uses_slip(),
+                extras: Extras { forces: with_forces, tangent: false, slip: scene.haptics.uses_slip() },
             },
             with_forces,
             grid,
@@ -189,7 +186,7 @@ impl<'a> Sweep<'a> {
     pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), Error> {
         if lowest::applies(model.contact.law) {
             self.lowest = Some(self.fitting(model)?);
-            self.shape.with_forces = true;
+            self.shape.extras.forces = true;
         }
         Ok(())
     }
@@ -221,7 +218,7 @@ impl<'a> Sweep<'a> {
     pub(crate) fn solved_by(&mut self, backend: &ChosenBackend<'_>) {
         self.provenance.backend = backend.name().into();
         self.provenance.adapter = backend.adapter();
-        if let (Some(forecast), ChosenBackend::Gpu { .. }) = (&mut self.forecast, backend) {
+        if let (Some(forecast), false) = (&mut self.forecast, backend.is_cpu_alone()) {
             forecast.seconds = None;
         }
     }
@@ -237,7 +234,7 @@ impl<'a> Sweep<'a> {
         if joints != self.grid.joints() {
             return Err(in_grid(format_args!("{} axes for {joints} joints", self.grid.joints())));
         }
-        self.shape.with_tangent = model.with_tangent;
+        self.shape.extras.tangent = model.with_tangent;
         Ok(model)
     }
 
@@ -263,8 +260,7 @@ impl<'a> Sweep<'a> {
             chunk.saturating_add(if in_memory { results(touching).saturating_mul(2) } else { assembly::buffers() })
         };
         // A shard holds the forces from which lower equilibria are searched for.
-        let with_forces = self.with_forces || (self.shard != Shard::WHOLE && self.shape.with_forces);
-        let stored = Shape { with_forces, ..self.shape };
+        let stored = if self.shard == Shard::WHOLE { self.stored() } else { self.shape };
         let disk = |touching| if in_memory { 0 } else { footprint::results(points, touching, stored) };
         Footprint { memory: Bounds::of(self.proxy_nodes, memory), disk: Bounds::of(self.proxy_nodes, disk) }
     }
@@ -272,13 +268,9 @@ impl<'a> Sweep<'a> {
     /// Returns where [`Sweep::bake`] keeps what it has of `output`.
     #[must_use]
     pub fn part_of(output: &Path) -> PathBuf {
-        with_suffix(output, ".part")
-    }
-
-    /// Name that the file `output` has while it is put together.
-    #[must_use]
-    pub fn growing_of(output: &Path) -> PathBuf {
-        with_suffix(output, ".growing")
+        let mut name = OsString::from(output);
+        name.push(".part");
+        name.into()
     }
 
     /// Sweeps in memory.
@@ -298,18 +290,17 @@ impl<'a> Sweep<'a> {
         let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut chunks)?;
         let blocks = chunks.iter().map(|(first, columns)| Block::of(columns, *first)).collect();
-        let mut table = Table::new(self.shape.width(), blocks);
+        let mut table = Table::new(self.shape, blocks);
         let (report, provenance) = self.complete(solved, &mut table, run.stop, None)?;
-        let shape = Shape { with_forces: self.with_forces, ..self.shape };
         // Nothing stops it halfway.
         let never = AtomicBool::new(false);
-        let results = Results::new(&table, points, shape, &never);
-        let dataset = self.dataset(&results, provenance);
-        Ok((dataset.map_err(|why| no_memory(points, bytes, why))?, report))
+        let mut results = Results::new(&table, points, self.stored(), &never);
+        let dataset = Dataset::of(&mut results, self.grid.clone()).map_err(|why| no_memory(points, bytes, why))?;
+        Ok((Dataset { surface: Some(self.surface.clone()), scene: self.scene.clone(), provenance, ..dataset }, report))
     }
 
-    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. While it
-    /// is put together its name ends in `.growing`. Memory does not grow with the grid.
+    /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. Memory does
+    /// not grow with the grid.
     ///
     /// With `resume` it continues from such a part; the file is then the same, bit for bit, as without the
     /// interruption, the date of the beginning included. Without a part it begins. Without `resume` a part that holds
@@ -330,7 +321,6 @@ impl<'a> Sweep<'a> {
         // The part grows beside the file that a link leads to: only there can that be replaced.
         let output = &dataset::resolved(output).map_err(|source| unwritable(output, &source))?;
         dataset::check_place(output)?;
-        check_unclaimed(output)?;
         let mut binding = self.binding();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;
@@ -342,9 +332,6 @@ impl<'a> Sweep<'a> {
         }
         let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance };
-        // Nobody else writes there: the part is locked.
-        let growing = Self::growing_of(output);
-        let target = Target::growing(output, &growing);
         let stop = run.stop;
         let kept_in = part.path().to_path_buf();
         let unwritten = |why: Error, points| {
@@ -356,13 +343,11 @@ impl<'a> Sweep<'a> {
         };
         let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
         let map = part.map().map_err(|source| in_part(&kept_in, &source))?;
-        let mut table = part.table(&map, self.shape.width())?;
+        let mut table = part.table(&map, self.shape)?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
-        check_unclaimed(output)?;
         let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
-        let shape = Shape { with_forces: self.with_forces, ..self.shape };
-        let results = Results::new(&table, report.points, shape, stop);
-        results.assemble(target, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
+        let results = Results::new(&table, report.points, self.stored(), stop);
+        results.assemble(output, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         drop(map);
         part.remove()?;
         Ok(report)
@@ -376,8 +361,7 @@ impl<'a> Sweep<'a> {
             scene: self.scene.clone(),
             scene_path: self.scene_path.clone(),
             object: self.object,
-            with_tangent: self.shape.with_tangent,
-            with_slip: self.shape.with_slip,
+            shape: self.shape,
             provenance: self.provenance.clone(),
         }
     }
@@ -385,6 +369,11 @@ impl<'a> Sweep<'a> {
     /// Number of points that are solved.
     pub(super) fn points(&self) -> usize {
         self.shard.points(self.grid.points())
+    }
+
+    /// Columns of the dataset.
+    pub(super) fn stored(&self) -> Shape {
+        Shape { extras: Extras { forces: self.with_forces, ..self.shape.extras }, ..self.shape }
     }
 
     /// Finds the lowest equilibria and measures the error, as far as the sweep was asked to.
@@ -424,45 +413,12 @@ impl<'a> Sweep<'a> {
 
     pub(super) fn report(&self, solved: Solved) -> (SweepReport, Provenance) {
         let Solved { tally, facts, provenance } = solved;
-        let report = SweepReport::of(&tally, facts, &provenance, &self.warnings);
-        (SweepReport { skin: self.skin, forecast: self.forecast, ..report }, provenance)
+        (SweepReport::of(self, &tally, facts, &provenance), provenance)
     }
 
     /// Returns how free space is found, where it is.
     pub(super) fn free_space(&self) -> Option<FreeSpace<'_>> {
         self.model.map(|model| FreeSpace::new(model, &self.grid))
-    }
-
-    fn dataset(&self, results: &Results<'_>, provenance: Provenance) -> Result<Dataset, TryReserveError> {
-        let contacts = || -> Result<Contacts, TryReserveError> {
-            Ok(Contacts {
-                offsets: results.column(Stored::ContactOffsets)?.into(),
-                nodes: results.column(Stored::ContactNodes)?.into(),
-                forces: results.column(Stored::ContactForces)?.into(),
-            })
-        };
-        let slip = || -> Result<SlipColumns, TryReserveError> {
-            Ok(SlipColumns {
-                normal_force: results.column(Stored::NormalForce)?.into(),
-                jacobian: results.column(Stored::SlipJacobian)?.into(),
-            })
-        };
-        Ok(Dataset {
-            grid: self.grid.clone(),
-            torque: results.column(Stored::Torque)?.into(),
-            energy: Some(results.column(Stored::Energy)?.into()),
-            tangent: self.shape.with_tangent.then(|| results.column(Stored::Tangent)).transpose()?.map(Into::into),
-            gap: Some(results.column(Stored::Gap)?.into()),
-            status: results.column(Stored::Status)?.into(),
-            residual: Some(results.column(Stored::Residual)?.into()),
-            iterations: Some(results.column(Stored::Iterations)?.into()),
-            contacts: self.with_forces.then(contacts).transpose()?,
-            slip: self.shape.with_slip.then(slip).transpose()?,
-            surface: Some(self.surface.clone()),
-            refinement: None,
-            scene: self.scene.clone(),
-            provenance,
-        })
     }
 }
 
@@ -481,12 +437,6 @@ pub(super) fn check_axes(scene: &Scene) -> Result<(), Error> {
     if joints > MAX_AXES { Err(too_many_joints(joints)) } else { Ok(()) }
 }
 
-/// Checks that no other process writes the file `output`: it would be lost, or the dataset written over.
-fn check_unclaimed(output: &Path) -> Result<(), Error> {
-    // Where nobody can claim it nobody can write it either, which is told by who tries.
-    if matches!(Claim::new(output), Ok(None)) { Err(busy(output)) } else { Ok(()) }
-}
-
 /// CRC-32 of all that contact knows of `object`.
 fn content(object: &Object) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
@@ -495,10 +445,4 @@ fn content(object: &Object) -> u32 {
     hasher.update(bytemuck::cast_slice(&object.stiffness.columns));
     object.stiffness.blocks.iter().for_each(|block| hasher.update(bytemuck::cast_slice(&block.to_cols_array())));
     hasher.finalize()
-}
-
-fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
-    let mut name = OsString::from(path);
-    name.push(suffix);
-    name.into()
 }

@@ -1,9 +1,6 @@
 //! One configuration in full: what equation (2) says of it, for the eye and for other programs.
 
-use crate::{
-    JointVector,
-    contact::{Equilibrium, Model, Solver},
-};
+use crate::contact::{Equilibrium, Model, Solver};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -105,17 +102,5 @@ impl Inspection {
             proxy_nodes,
             object_nodes,
         }
-    }
-
-    /// tau once more, as the sum of J_i^T (force on x_i) over the listed contacts (N m or N).
-    #[must_use]
-    pub fn torque_of_contacts(&self) -> JointVector {
-        let mut torque = JointVector::zeros(self.q.len());
-        for node in &self.proxy_nodes {
-            if let Some(contact) = &node.contact {
-                torque.iter_mut().zip(&node.jacobian).for_each(|(tau, column)| *tau += column.dot(contact.force));
-            }
-        }
-        torque
     }
 }

@@ -313,10 +313,14 @@ impl Lattice for UniformGrid<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{dataset::Stored, fixtures::grids, sweep::table::Block};
+    use crate::{
+        dataset::{Extras, Stored},
+        fixtures::grids,
+        sweep::table::Block,
+    };
 
     const SHAPE: Shape =
-        Shape { joints: 1, surface_nodes: 9, with_forces: true, with_tangent: false, with_slip: false };
+        Shape { joints: 1, surface_nodes: 9, extras: Extras { forces: true, tangent: false, slip: false } };
 
     /// An equilibrium in contact with as many node forces as its energy has joules.
     fn equilibrium(energy: f64, torque: f64) -> Equilibrium {
@@ -346,14 +350,14 @@ mod tests {
         // U grows by 1 a step of 1 with torque -1; point 2 holds 0.5 too much.
         let grid = grids::grid(&[(0.0, 1.0, 5)]);
         let five = columns(&[1.0, 2.0, 3.5, 4.0, 5.0]);
-        let mut table = Table::new(SHAPE.width(), vec![Block::of(&five, 0)]);
+        let mut table = Table::new(SHAPE, vec![Block::of(&five, 0)]);
         let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
         let found: Vec<_> = (0..5).map(|point| starts(&around, point, |_| true)).collect();
         assert_eq!(found, [vec![], vec![], vec![1, 3], vec![], vec![]]);
         assert_eq!(starts(&around, 2, |n| n == 3), [3]);
         // Below the tolerance nothing is tried.
         let near = columns(&[1.0, 2.0 + 0.5 * EDGE_TOLERANCE, 3.0]);
-        let mut table = Table::new(SHAPE.width(), vec![Block::of(&near, 0)]);
+        let mut table = Table::new(SHAPE, vec![Block::of(&near, 0)]);
         let grid = grids::grid(&[(0.0, 1.0, 3)]);
         let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
         assert!((0..3).all(|point| starts(&around, point, |_| true).is_empty()));
@@ -363,11 +367,11 @@ mod tests {
     #[test]
     fn replaced_results_are_read_in_their_place() {
         let (first, second) = (columns(&[1.0, 2.0]), columns(&[3.0, 0.0, 5.0]));
-        let mut table = Table::new(SHAPE.width(), vec![Block::of(&first, 0), Block::of(&second, 2)]);
+        let mut table = Table::new(SHAPE, vec![Block::of(&first, 0), Block::of(&second, 2)]);
         table.replaced = Replaced::from([(1, columns(&[4.0])), (3, columns(&[2.0]))]);
         let expected = columns(&[1.0, 4.0, 3.0, 2.0, 5.0]);
         for section in [Stored::Energy, Stored::ContactNodes, Stored::ContactForces, Stored::Status] {
-            let size = SHAPE.width().bytes(section);
+            let size = SHAPE.bytes(section);
             let runs = table.runs(0..5).map(|(block, points)| block.bytes(section, points, size).to_vec());
             assert_eq!(runs.collect::<Vec<_>>().concat(), expected.bytes()[section as usize]);
             assert_eq!(table.runs(1..4).map(|(_, points)| points).collect::<Vec<_>>(), [0..1, 0..1, 0..1]);

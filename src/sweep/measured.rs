@@ -303,6 +303,7 @@ mod tests {
     use super::*;
     use crate::{
         contact::Equilibrium,
+        dataset::Extras,
         fixtures::grids,
         sweep::{
             columns::{Columns, Shape},
@@ -311,7 +312,7 @@ mod tests {
     };
 
     const SHAPE: Shape =
-        Shape { joints: 2, surface_nodes: 0, with_forces: false, with_tangent: false, with_slip: false };
+        Shape { joints: 2, surface_nodes: 0, extras: Extras { forces: false, tangent: false, slip: false } };
 
     /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
     fn columns(grid: &Grid) -> Columns {
@@ -346,7 +347,7 @@ mod tests {
     fn configurations_are_spread_evenly_over_the_cells_in_contact() {
         let grid = grids::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
         let columns = columns(&grid);
-        let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
         // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
         let places = places(&grid, &table, 16, 1200, DRAWS);
         assert_eq!(places.len(), 1200);
@@ -373,7 +374,7 @@ mod tests {
     fn a_window_around_a_configuration_gives_what_the_whole_grid_gives() {
         let grid = grids::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
         let columns = columns(&grid);
-        let table = Table::new(SHAPE.width(), vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
         let places = places(&grid, &table, 54 * 80, 50, DRAWS);
         let places: Vec<&Place> = places.iter().collect();
         let slope = JointVector::from_slice(&[1e3, 1e3]);

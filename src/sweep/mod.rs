@@ -58,6 +58,6 @@ pub use placing::Placing;
 pub use plan::{Plan, ShardCost};
 pub(crate) use reach::shallow;
 pub use reach::{DepthShare, JointReach, Reach};
-pub use reference::REFERENCE_TOLERANCE;
+pub use reference::{REFERENCE_TOLERANCE, Reference};
 pub use report::{Iterations, SweepReport};
 pub use shard::{EXTENSION as SHARD_EXTENSION, Shard, ranges};

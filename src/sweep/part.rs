@@ -1,7 +1,7 @@
 //! The part: an unfinished sweep on disk, so that killing the process loses one chunk at most.
 //!
 //! ```text
-//! "haptize part 6\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
+//! "haptize part 7\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
 //! The first body is the [`Binding`] as JSON, every other one a [`Block`] of results, or [`NOTICE`] and a text. Frames
@@ -11,7 +11,7 @@
 
 use super::{
     Shard,
-    columns::Width,
+    columns::Shape,
     error::{busy, foreign, in_part, other_part, unwritable},
     shard,
     table::{Block, Table},
@@ -30,7 +30,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-const MAGIC: &[u8] = b"haptize part 6\n";
+const MAGIC: &[u8] = b"haptize part 7\n";
 /// How the body of a notice begins: as no block of columns does, whose first point has no such number.
 const NOTICE: [u8; 8] = [u8::MAX; 8];
 
@@ -46,10 +46,7 @@ pub(super) struct Binding {
     /// CRC-32 of the object: all its nodes at rest, its surface and its stiffness. It may come from a mesh file, whose
     /// contents the scene does not hold.
     pub object: u32,
-    /// Whether tangents are stored.
-    pub with_tangent: bool,
-    /// Whether slips are stored.
-    pub with_slip: bool,
+    pub shape: Shape,
     pub provenance: Provenance,
 }
 
@@ -68,11 +65,6 @@ impl Binding {
     /// Number of points that it is to hold.
     pub fn points(&self) -> usize {
         self.shard.points(self.grid.points())
-    }
-
-    /// Numbers that each point has.
-    pub fn width(&self) -> Width {
-        Width { joints: self.grid.joints(), tangent: self.with_tangent, slip: self.with_slip }
     }
 
     /// Returns the first difference from `other` that forbids to continue it; the date may differ.
@@ -98,8 +90,7 @@ impl Binding {
             ("another grid", self.grid != other.grid),
             ("another text of the scene", self.scene != other.scene),
             ("another object, such as a mesh that has changed since", self.object != other.object),
-            ("another interpolation, for which tangents are stored or not", self.with_tangent != other.with_tangent),
-            ("friction, for which slips are stored or not", self.with_slip != other.with_slip),
+            ("another interpolation or other effects, for which other columns are stored", self.shape != other.shape),
         ];
         differences.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
     }
@@ -139,7 +130,7 @@ impl Found {
         let binding: Binding = serde_json::from_slice(&bytes[body]).map_err(|error| error.to_string())?;
         binding.grid.check()?;
         binding.shard.check()?;
-        let (points, width) = (binding.grid.points(), binding.width());
+        let (points, shape) = (binding.grid.points(), binding.shape);
         let (notices, tally) = (Vec::new(), Tally::default());
         let mut found = Self { binding, blocks, notices, tally, results, end: results };
         while let Some(body) = frame(bytes, found.end) {
@@ -150,7 +141,7 @@ impl Found {
             } else {
                 let next = found.binding.shard.rest(points, found.tally.points);
                 let is_next = |block: &Block<'_>| block.first == next.start && block.points() <= next.len();
-                let Some(block) = Block::read(contents, width).filter(is_next) else { break };
+                let Some(block) = Block::read(contents, shape).filter(is_next) else { break };
                 found.tally.add(&block);
                 found.blocks.push(body.clone());
                 body.end
@@ -161,8 +152,8 @@ impl Found {
 
     /// The blocks of results in `bytes`, from which this was read.
     pub fn blocks<'m>(&self, bytes: &'m [u8]) -> impl Iterator<Item = Block<'m>> {
-        let width = self.binding.width();
-        self.blocks.iter().filter_map(move |body| Block::read(&bytes[body.clone()], width))
+        let shape = self.binding.shape;
+        self.blocks.iter().filter_map(move |body| Block::read(&bytes[body.clone()], shape))
     }
 
     /// Whether all points are there, and nothing of `bytes` is damaged.
@@ -284,9 +275,9 @@ impl Part {
     }
 
     /// The results in `map`, which is of this part.
-    pub fn table<'m>(&self, map: &'m Mmap, width: Width) -> Result<Table<'m>, Error> {
+    pub fn table<'m>(&self, map: &'m Mmap, shape: Shape) -> Result<Table<'m>, Error> {
         let blocks = self.found(map)?.map_or_else(Vec::new, |found| found.blocks(map).collect());
-        Ok(Table::new(width, blocks))
+        Ok(Table::new(shape, blocks))
     }
 }
 

@@ -8,17 +8,13 @@
 //! are relative to the rms of the torque itself. Where torque jumps, the worst error is as large as the jump on any
 //! grid: it is reported, and not promised.
 
-use super::{
-    BackendChoice, Bake, ChosenBackend, Footprint, Sweep, build_object, grid_sweep::check_given, reference::Reference,
-    sample, spacing,
-};
+use super::{BackendChoice, Bake, build_object, grid_sweep::check_given, reference::Reference, sample, spacing};
 use crate::{
     Error,
     contact::Model,
     dataset::Dataset,
     error,
     field::TorqueField,
-    object::Object,
     proxy::Chain,
     scene::{ContactSpec, EffortNorm, Interpolation, NormUnit, Scene},
 };
@@ -199,24 +195,8 @@ pub struct Choice {
     pub tolerance: f64,
     /// Time that the bake takes, at the pilot's rate (s).
     pub seconds: f64,
-    /// Memory and disk.
-    pub footprint: Footprint,
-}
-
-/// Where scene and object are.
-struct Ground {
-    object: Object,
-    chain: Chain,
-}
-
-impl Ground {
-    fn new(scene: &Scene) -> Result<Self, Error> {
-        Ok(Self { object: build_object(scene)?, chain: Chain::new(&scene.proxy) })
-    }
-
-    fn model(&self, scene: &Scene) -> Result<Model<'_>, Error> {
-        Model::reaching(&self.object, &self.chain, scene.contact, &sample(scene))
-    }
+    /// The dataset, as large as the pilot's for each point (bytes).
+    pub bytes: f64,
 }
 
 impl Pilot {
@@ -227,8 +207,8 @@ impl Pilot {
     pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, Error> {
         check_given(scene)?;
         let aim = aim.checked(scene)?;
-        let ground = Ground::new(scene)?;
-        let model = ground.model(scene)?;
+        let (object, chain) = (build_object(scene)?, Chain::new(&scene.proxy));
+        let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
         let reference = Reference::in_contact(scene, &model, SEED, CONTACTS)?;
         let joints = scene.grid.axes.len();
         let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);
@@ -294,7 +274,7 @@ impl Pilot {
     ///
     /// # Errors
     /// When there are none; the error says what the pilot measured, and what would help.
-    pub fn choose(&self, scene: &Scene, limit: usize, backend: BackendChoice) -> Result<Choice, Error> {
+    pub fn choose(&self, scene: &Scene, limit: usize) -> Result<Choice, Error> {
         let within = |best: &&Prospect| best.points <= limit as f64 && best.finer <= FARTHEST_EXTRAPOLATION;
         let best = self.prospects.first();
         let Some(best) = best.filter(within) else {
@@ -312,7 +292,7 @@ impl Pilot {
             points,
             tolerance: self.tolerance,
             seconds: self.seconds_per_point * points as f64,
-            footprint: footprint(&chosen, backend.for_work(self.seconds_per_point * points as f64))?,
+            bytes: self.bytes_per_point * points as f64,
             scene: chosen,
         })
     }
@@ -408,15 +388,6 @@ fn errors(
     let spec = &scene.haptics;
     let field = TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)?;
     Ok(reference.errors(|q| field.sample(q).torque))
-}
-
-/// Returns the memory and disk space that baking `scene` into a file takes.
-fn footprint(scene: &Scene, backend: BackendChoice) -> Result<Footprint, Error> {
-    let ground = Ground::new(scene)?;
-    let model = ground.model(scene)?;
-    let backend = ChosenBackend::open(backend, &model)?;
-    let sweep = Sweep::new(scene, &ground.object, "", "", "")?;
-    Ok(sweep.footprint(backend.chunk(), false))
 }
 
 #[cfg(test)]

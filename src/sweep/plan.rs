@@ -3,7 +3,7 @@
 //! Which points are skipped is found out for the whole grid, as each shard does. The time of the others is shared out
 //! from the forecast of the whole sweep (`forecast.rs`).
 
-use super::{BackendChoice, Bake, ChosenBackend, Forecast, Shard};
+use super::{BackendChoice, Bake, Forecast, Shard};
 use crate::{Error, memory, scene::Scene};
 use serde::Serialize;
 use std::{sync::atomic::AtomicBool, time::Instant};
@@ -63,7 +63,7 @@ impl Plan {
             let setup = start.elapsed().as_secs_f64();
             sweep.shard = Shard::WHOLE;
             // A GPU's time for few points says nothing of many.
-            let is_timed = matches!(backend, ChosenBackend::Cpu(_));
+            let is_timed = backend.is_cpu_alone();
             let forecast = sweep.forecast.map_or_else(|| sweep.sampled(backend, is_timed), Ok)?;
             sweep.shard = Shard { index: 0, count };
             let largest = sweep.footprint(run.chunk, false);

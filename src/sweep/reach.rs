@@ -228,7 +228,7 @@ impl Reach {
         while spacing::points(&scene) as f64 > 2.0 * points {
             scene = spacing::spaced(&scene, |steps| (steps / std::f64::consts::SQRT_2).round().max(FEWEST_STEPS));
         }
-        Ok(scene.with_own_text()?)
+        scene.with_own_text()
     }
 }
 

@@ -23,25 +23,25 @@ const MOST_DRAWN: usize = 1 << 16;
 const DIRECTIONS: usize = 16;
 
 /// Configurations and their torques, each solved once.
-pub(crate) struct Reference {
+pub struct Reference {
     /// Configurations (rad or m).
-    pub places: Vec<JointVector>,
+    pub(crate) places: Vec<JointVector>,
     /// Torques there, converged.
-    pub exact: Vec<JointVector>,
+    pub(crate) exact: Vec<JointVector>,
     /// Energies there (J).
     energies: Vec<f64>,
-    pub in_contact: usize,
-    pub left_out: usize,
+    pub(crate) in_contact: usize,
+    pub(crate) left_out: usize,
     /// Forces on the object's nodes, of all configurations.
     forces: usize,
-    /// rms of the torque (the norm's unit).
+    /// Rms of the torque (the norm's unit).
     pub torque: f64,
-    pub norm: EffortNorm,
+    pub(crate) norm: EffortNorm,
 }
 
 impl Reference {
     /// What was `solved`; configurations that did not converge are left out.
-    pub fn of(norm: EffortNorm, solved: impl IntoIterator<Item = (JointVector, Equilibrium)>) -> Self {
+    pub(crate) fn of(norm: EffortNorm, solved: impl IntoIterator<Item = (JointVector, Equilibrium)>) -> Self {
         let (places, exact, energies) = (Vec::new(), Vec::new(), Vec::new());
         let mut reference = Self { places, exact, energies, in_contact: 0, left_out: 0, forces: 0, torque: 0.0, norm };
         reference.extend(solved);
@@ -70,12 +70,15 @@ impl Reference {
     }
 
     /// Solves `count` random configurations within the grid of `scene`, the same ones every time for the same `seed`.
-    pub fn solve(scene: &Scene, model: &Model<'_>, seed: u64, count: usize) -> Result<Self, Error> {
+    pub(crate) fn solve(scene: &Scene, model: &Model<'_>, seed: u64, count: usize) -> Result<Self, Error> {
         Self::drawn(scene, model, seed, count, 0)
     }
 
-    /// As [`Reference::solve`], with twice as many configurations again and again until `contacts` of them are in
-    /// contact, or no more are drawn.
+    /// Solves random configurations within the grid of `scene`, the same ones every time for the same `seed`: twice as
+    /// many again and again, until `contacts` of them are in contact or no more are drawn.
+    ///
+    /// # Errors
+    /// When nothing touches.
     pub fn in_contact(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, Error> {
         Self::drawn(scene, model, seed, 2 * contacts, contacts)
     }
@@ -110,30 +113,32 @@ impl Reference {
         Ok(reference)
     }
 
-    /// Number of configurations that were solved.
+    /// Number of configurations that were solved, free ones among them.
+    #[must_use]
     pub fn solved(&self) -> usize {
         self.places.len() + self.left_out
     }
 
-    /// Mean number of the object's nodes with a contact force (1).
+    /// Mean number of the object's nodes with a contact force, of all configurations (1).
+    #[must_use]
     pub fn mean_forces(&self) -> f64 {
         self.forces as f64 / self.solved().max(1) as f64
     }
 
     /// Its own error, rms: distance of the same configurations solved a hundred times as roughly (N m).
-    pub fn own_error(&self, scene: &Scene, model: &Model<'_>) -> Result<f64, Error> {
+    pub(crate) fn own_error(&self, scene: &Scene, model: &Model<'_>) -> Result<f64, Error> {
         self.error_of(model, tight(scene.contact, 100.0 * REFERENCE_TOLERANCE))
     }
 
     /// Rms distance of the same configurations solved as `contact` says (N m).
-    pub fn error_of(&self, model: &Model<'_>, contact: ContactSpec) -> Result<f64, Error> {
+    pub(crate) fn error_of(&self, model: &Model<'_>, contact: ContactSpec) -> Result<f64, Error> {
         let solved = equilibria(model, contact, &self.places)?;
         let mut torques = solved.iter().map(|equilibrium| equilibrium.torque);
         Ok(self.errors(|q| torques.next().unwrap_or(*q)).0)
     }
 
     /// The same configurations with other torques.
-    pub fn with(&self, exact: Vec<JointVector>) -> Self {
+    pub(crate) fn with(&self, exact: Vec<JointVector>) -> Self {
         Self { places: self.places.clone(), exact, energies: self.energies.clone(), ..*self }
     }
 
@@ -152,7 +157,7 @@ impl Reference {
     }
 
     /// What is told of a dataset whose own `interpolation` and others have `errors` here.
-    pub fn measured(&self, interpolation: Interpolation, errors: Vec<InterpolationError>) -> MeasuredError {
+    pub(crate) fn measured(&self, interpolation: Interpolation, errors: Vec<InterpolationError>) -> MeasuredError {
         MeasuredError {
             configurations: self.places.len(),
             left_out: self.left_out,
@@ -167,7 +172,7 @@ impl Reference {
 
     /// Returns how far friction by the slip of all contacts of `model` together lies above that of each; `None` where it
     /// is not asked for, or no two touch at once.
-    pub fn friction_excess(&self, model: &Model<'_>) -> Option<FrictionExcess> {
+    pub(crate) fn friction_excess(&self, model: &Model<'_>) -> Option<FrictionExcess> {
         let solvers = Solvers::new(model, rayon::current_num_threads());
         let places: Vec<_> = self.places.iter().enumerate().filter(|_| model.with_slip).collect();
         let excesses = solvers.map(&places, |solver, (number, q)| {
@@ -187,7 +192,7 @@ impl Reference {
 
     /// Mean of the squared distance of the torque that `answer` gives at each place from the exact one, and the
     /// standard deviation of that mean over random places (N^2 m^2).
-    pub fn mean_square(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
+    pub(crate) fn mean_square(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
         let squares = self.squares(answer);
         let count = squares.len().max(1) as f64;
         let mean = squares.iter().sum::<f64>() / count;
@@ -196,14 +201,19 @@ impl Reference {
     }
 
     /// Root mean square and greatest distance of the torque that `answer` gives at each place from the exact one (N m).
-    pub fn errors(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
+    pub(crate) fn errors(&self, answer: impl FnMut(&JointVector) -> JointVector) -> (f64, f64) {
         let squares = self.squares(answer);
         let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
         (mean.sqrt(), squares.into_iter().fold(0.0, f64::max).sqrt())
     }
 
+    /// Rms error of the torque that `answer` gives, over the rms of the torque (1).
+    pub fn relative_error(&self, answer: impl FnMut(&JointVector) -> JointVector) -> f64 {
+        self.errors(answer).0 / self.torque
+    }
+
     /// Distance of the torque that `answer` gives at each place from the exact one (N m).
-    pub fn distances(&self, answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
+    pub(crate) fn distances(&self, answer: impl FnMut(&JointVector) -> JointVector) -> Vec<f64> {
         self.squares(answer).into_iter().map(f64::sqrt).collect()
     }
 

@@ -1,6 +1,6 @@
 //! The report of a sweep, in numbers.
 
-use super::{Footprint, Forecast, Lowered, tally::Tally};
+use super::{Footprint, Forecast, Lowered, Sweep, tally::Tally};
 use crate::contact::MeshRipple;
 use crate::dataset::{MeasuredError, Provenance};
 use crate::object::Skin;
@@ -70,12 +70,24 @@ pub struct Iterations {
     pub max: u32,
 }
 
+/// Facts about a run beside its results.
+pub(super) struct RunFacts {
+    pub footprint: Footprint,
+    pub skipped_points: usize,
+    pub resumed_points: usize,
+    /// By the backend.
+    pub left_to_cpu: usize,
+    pub lowered: Option<Lowered>,
+    /// Part of `time` spent on solving from rest.
+    pub solving: Duration,
+    pub time: Duration,
+}
+
 impl SweepReport {
-    pub(super) fn of(tally: &Tally, run: RunFacts, provenance: &Provenance, object_warnings: &[String]) -> Self {
-        let RunFacts { footprint, skipped_points, resumed_points, solved_points, left_to_cpu, lowered, solving, time } =
-            run;
+    /// Of a run of `sweep`.
+    pub(super) fn of(sweep: &Sweep<'_>, tally: &Tally, run: RunFacts, provenance: &Provenance) -> Self {
         let contact_points = tally.statuses.in_contact();
-        let seconds = time.as_secs_f64();
+        let seconds = run.time.as_secs_f64();
         Self {
             points: tally.points,
             contact_points,
@@ -86,38 +98,24 @@ impl SweepReport {
                 mean: tally.iterations as f64 / contact_points.max(1) as f64,
                 max: tally.max_iterations,
             },
-            skipped_points,
-            resumed_points,
-            left_to_cpu,
-            lowered,
+            skipped_points: run.skipped_points,
+            resumed_points: run.resumed_points,
+            left_to_cpu: run.left_to_cpu,
+            lowered: run.lowered,
             error: provenance.error.clone(),
             seconds,
-            solving_seconds: solving.as_secs_f64(),
-            // A clock that did not move is taken for its own resolution.
-            configurations_per_second: solved_points as f64 / time.max(Duration::from_nanos(1)).as_secs_f64(),
+            solving_seconds: run.solving.as_secs_f64(),
+            // A clock that did not move is taken for its own resolution; skipped points count as solved.
+            configurations_per_second: (tally.points - run.resumed_points) as f64
+                / run.time.max(Duration::from_nanos(1)).as_secs_f64(),
             backend: provenance.backend.clone(),
             adapter: provenance.adapter.clone(),
             algorithm: provenance.algorithm.clone(),
-            footprint,
-            forecast: None,
-            skin: None,
+            footprint: run.footprint,
+            forecast: sweep.forecast,
+            skin: sweep.skin,
             mesh_ripple: provenance.mesh_ripple,
-            warnings: object_warnings.iter().chain(&provenance.notices).cloned().collect(),
+            warnings: sweep.warnings.iter().chain(&provenance.notices).cloned().collect(),
         }
     }
-}
-
-/// Facts about a run beside its results.
-pub(super) struct RunFacts {
-    pub footprint: Footprint,
-    pub skipped_points: usize,
-    pub resumed_points: usize,
-    /// By this run, with those that it skipped.
-    pub solved_points: usize,
-    /// By the backend.
-    pub left_to_cpu: usize,
-    pub lowered: Option<Lowered>,
-    /// Part of `time` spent on solving from rest.
-    pub solving: Duration,
-    pub time: Duration,
 }

@@ -6,7 +6,7 @@
 //! the columns, in the order of `RESULTS`; those of offsets hold the end of each point's row within the block
 //! ```
 
-use super::columns::{COLUMNS, Columns, Replaced, Width, lengths};
+use super::columns::{COLUMNS, Columns, Replaced, Shape, lengths};
 use crate::{
     JointVector,
     contact::{Equilibrium, NodeForce, Status},
@@ -18,7 +18,7 @@ use std::ops::Range;
 
 /// Results of all points of a grid, with the new ones of single points over them.
 pub(super) struct Table<'a> {
-    width: Width,
+    shape: Shape,
     /// In the order of the points.
     blocks: Vec<Block<'a>>,
     pub replaced: Replaced,
@@ -70,15 +70,15 @@ impl<'a> Block<'a> {
         Self { first, columns: columns.bytes() }
     }
 
-    /// Reads a block of points of `width`; `None` when it is none.
-    pub fn read(bytes: &'a [u8], width: Width) -> Option<Self> {
+    /// Reads a block of points of `shape`; `None` when it is none.
+    pub fn read(bytes: &'a [u8], shape: Shape) -> Option<Self> {
         let (opening, mut rest) = bytes.split_first_chunk::<{ 8 * OPENING }>()?;
         let numbers: [[u8; 8]; OPENING] = bytemuck::cast(*opening);
         let mut numbers = numbers.into_iter().map(|number| usize::try_from(u64::from_le_bytes(number)).ok());
         let mut next = || numbers.next().flatten();
         let (first, points, contacts) = (next()?, next()?, next()?);
         let mut columns = [&[][..]; COLUMNS];
-        for (column, length) in columns.iter_mut().zip(lengths(points, width, contacts)) {
+        for (column, length) in columns.iter_mut().zip(lengths(points, shape, contacts)) {
             (*column, rest) = rest.split_at_checked(length)?;
         }
         let block = Self { first, columns };
@@ -156,8 +156,8 @@ impl<'a> Block<'a> {
 
 impl<'a> Table<'a> {
     /// The points of `blocks`, which follow one another from point 0 on.
-    pub fn new(width: Width, blocks: Vec<Block<'a>>) -> Self {
-        Self { width, blocks, replaced: Replaced::new() }
+    pub fn new(shape: Shape, blocks: Vec<Block<'a>>) -> Self {
+        Self { shape, blocks, replaced: Replaced::new() }
     }
 
     /// Status of a point.
@@ -167,7 +167,7 @@ impl<'a> Table<'a> {
 
     /// Result of a point.
     pub fn result(&self, point: usize) -> PointResult {
-        self.read(point, |block, row| block.result(row, self.width.joints))
+        self.read(point, |block, row| block.result(row, self.shape.joints))
     }
 
     /// Forces on the object's nodes at a point, ascending by node (N).
@@ -178,7 +178,7 @@ impl<'a> Table<'a> {
     /// Result of a point as it was before it was replaced.
     pub fn before(&self, point: usize) -> PointResult {
         let block = self.block(point);
-        block.result(point - block.first, self.width.joints)
+        block.result(point - block.first, self.shape.joints)
     }
 
     /// The blocks that hold `points`, in their order, and which of a block's points those are.

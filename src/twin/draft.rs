@@ -2,7 +2,7 @@
 
 use super::{Approaches, ScannedShape};
 use crate::{
-    Error, error,
+    Error,
     object::{Draft, LengthUnit},
     scene::{Scene, SceneText},
     toml_text::{entry, heading, number},
@@ -29,7 +29,6 @@ pub fn twin_scene(
     young: f64,
     width: Option<f64>,
 ) -> Result<Scene, Error> {
-    let refused = |why: crate::scene::SceneError| error!("{why}");
     let low = shape.nodes.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let high = shape.nodes.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     let held = LAYER * shape.spacing / (high.z - low.z);
@@ -37,12 +36,12 @@ pub fn twin_scene(
     let mut tables = draft.tables;
     // Writing to a string fails only where memory does.
     let _ = write_tables(&mut tables, approaches);
-    let mut scene = SceneText::new(text, path).map_err(refused)?;
+    let mut scene = SceneText::new(text, path)?;
     scene.remove("scan");
-    scene.replace(&tables).map_err(refused)?;
+    scene.replace(&tables)?;
     // The draft lies in the middle of the world.
     scene.move_object(low.midpoint(high));
-    Scene::parse(&scene.to_string(), path).map_err(refused)
+    Scene::parse(&scene.to_string(), path)
 }
 
 /// Contact, and a grid over the configurations of the scan.

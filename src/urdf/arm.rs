@@ -7,7 +7,8 @@
 
 use super::group::Group;
 use super::robot::{Joint, JointType, Robot};
-use super::{Inertial, Placed, UrdfError};
+use super::{Inertial, Placed};
+use crate::Error;
 use crate::MAX_AXES;
 use crate::scene::JointKind;
 use glam::{DAffine3, DQuat, DVec3};
@@ -74,9 +75,9 @@ impl Arm {
     /// Returns the chain of `robot` to the link `tip`, joints of `locks` held.
     ///
     /// # Errors
-    /// [`UrdfError::Request`] if `tip` or a lock names nothing, a lock is outside its limits, or there are more than
-    /// six joints or none; [`UrdfError::Invalid`] if a joint on the way is one that a scene does not have.
-    pub fn new(robot: &Robot, tip: &str, locks: &[Lock]) -> Result<Self, UrdfError> {
+    /// If `tip` or a lock names nothing, a lock is outside its limits, there are more than six joints or none, or a
+    /// joint on the way is one that a scene does not have.
+    pub fn new(robot: &Robot, tip: &str, locks: &[Lock]) -> Result<Self, Error> {
         let held = held(robot, locks)?;
         let way = way(robot, tip)?;
         let moving: Vec<&str> = way
@@ -93,7 +94,7 @@ impl Arm {
                     moving.join(", ")
                 ),
             };
-            return Err(UrdfError::Request { path: robot.path.clone(), message });
+            return Err(Error::at(&robot.path, message));
         }
         let mut builder = Builder { robot, held: &held, way: &way, children: children(robot), notes: Vec::new() };
         let root = way.first().map_or(0, |&number| robot.joints[number].parent);
@@ -129,11 +130,11 @@ impl Arm {
 }
 
 /// Motions of the joints that do not move: identity if fixed, that of its value if locked.
-fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, UrdfError> {
+fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error> {
     let fixed = robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointType::Fixed);
     let mut held: HashMap<usize, DAffine3> = fixed.map(|(number, _)| (number, DAffine3::IDENTITY)).collect();
     for Lock { joint: name, value } in locks {
-        let refuse = |message: String| Err(UrdfError::Request { path: robot.path.clone(), message });
+        let refuse = |message: String| Err(Error::at(&robot.path, message));
         let Some(number) = robot.joints.iter().position(|joint| joint.name == *name) else {
             let joints = robot.joints.iter().filter(|joint| joint.kind != JointType::Fixed);
             return refuse(format!("there is no joint {name:?} to lock: {}", listed(joints.map(|joint| &joint.name))));
@@ -163,7 +164,7 @@ fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, UrdfE
 }
 
 /// Joints from the root to the link `tip`.
-fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, UrdfError> {
+fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, Error> {
     let Some(mut link) = robot.links.iter().position(|link| link.name == tip) else {
         let parents: std::collections::HashSet<usize> = robot.joints.iter().map(|joint| joint.parent).collect();
         let ends: Vec<_> = robot.links.iter().enumerate().filter(|(number, _)| !parents.contains(number)).collect();
@@ -175,7 +176,7 @@ fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, UrdfError> {
             format!("chains end at {}", listed(ends.iter().map(|(_, link)| &link.name)))
         };
         let message = format!("there is no link {tip:?}; {known}");
-        return Err(UrdfError::Request { path: robot.path.clone(), message });
+        return Err(Error::at(&robot.path, message));
     };
     let movers: HashMap<usize, usize> =
         robot.joints.iter().enumerate().map(|(number, joint)| (joint.child, number)).collect();
@@ -261,7 +262,7 @@ impl Builder<'_> {
     }
 
     /// Returns kind and limits of a joint of the chain.
-    fn movement(&mut self, joint: &Joint) -> Result<(JointKind, [f64; 2]), UrdfError> {
+    fn movement(&mut self, joint: &Joint) -> Result<(JointKind, [f64; 2]), Error> {
         let name = &joint.name;
         let refuse = |message: String| Err(self.robot.source().error(joint.span.clone(), message));
         if let Some(leader) = &joint.mimic {

@@ -1,8 +1,7 @@
 //! XML of a robot file: elements, their attributes as numbers, and errors at their place.
 
-use super::UrdfError;
-use crate::names;
-use crate::scene::{self, Diagnostic};
+use crate::Error;
+use crate::{names, scene};
 use glam::DVec3;
 use roxmltree::{Document, Node, ParsingOptions};
 use std::{ops::Range, path::Path};
@@ -28,14 +27,14 @@ pub(super) struct Source<'a> {
 }
 
 /// Reads the file's text.
-pub(super) fn read_text(path: &Path) -> Result<String, UrdfError> {
-    scene::text::read(path).map_err(|reason| UrdfError::Unreadable { path: path.to_owned(), reason })
+pub(super) fn read_text(path: &Path) -> Result<String, Error> {
+    scene::text::read(path).map_err(|reason| Error::at(path, format_args!("cannot read the robot: {reason}")))
 }
 
 impl<'a> Source<'a> {
     /// Returns an error at `span`.
-    pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> UrdfError {
-        UrdfError::Invalid(Box::new(Diagnostic::new(self.path, self.text, span, message)))
+    pub fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+        Error::in_text(self.path, self.text, span, message.into())
     }
 
     /// Returns the line of the byte at `offset`, from 1.
@@ -44,7 +43,7 @@ impl<'a> Source<'a> {
     }
 
     /// Parses the text as XML without a document type, in which entities may be defined that grow without bound.
-    pub fn parse(&self) -> Result<Document<'a>, UrdfError> {
+    pub fn parse(&self) -> Result<Document<'a>, Error> {
         if self.path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xacro")) {
             return Err(self.error(0..0, XACRO));
         }
@@ -60,7 +59,7 @@ impl<'a> Source<'a> {
 
     /// Refuses what the parser would take very long for. No value of an attribute holds a `<`, so an element's are
     /// between its own and the next.
-    fn check_attributes(&self) -> Result<(), UrdfError> {
+    fn check_attributes(&self) -> Result<(), Error> {
         let mut start = 0;
         for element in self.text.split_inclusive('<') {
             let values = element.split('=').skip(1).filter(|value| value.trim_start().starts_with(['"', '\'']));
@@ -79,7 +78,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    fn xml_error(&self, error: &roxmltree::Error) -> UrdfError {
+    fn xml_error(&self, error: &roxmltree::Error) -> Error {
         match error {
             roxmltree::Error::DtdDetected => {
                 let start = self.text.find("<!DOCTYPE").unwrap_or(0);
@@ -107,7 +106,7 @@ impl<'a> Source<'a> {
     }
 
     /// Returns the text of an attribute that must be there.
-    pub fn required<'n>(&self, node: Node<'n, '_>, name: &str) -> Result<&'n str, UrdfError> {
+    pub fn required<'n>(&self, node: Node<'n, '_>, name: &str) -> Result<&'n str, Error> {
         let text = node.attribute(name).map(str::trim).filter(|text| !text.is_empty()).ok_or_else(|| {
             let message = format!("<{}> needs the attribute {name}", node.tag_name().name());
             self.error(node.range(), message)
@@ -117,7 +116,7 @@ impl<'a> Source<'a> {
     }
 
     /// Returns an attribute as N numbers, `None` if it is missing.
-    pub fn numbers<const N: usize>(&self, node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>, UrdfError> {
+    pub fn numbers<const N: usize>(&self, node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>, Error> {
         let Some(attribute) = node.attribute_node(name) else { return Ok(None) };
         let text = attribute.value();
         let bad = |message: String| self.error(attribute.range(), message);
@@ -141,12 +140,12 @@ impl<'a> Source<'a> {
     }
 
     /// Returns an attribute as a number, `None` if it is missing.
-    pub fn number(&self, node: Node<'_, '_>, name: &str) -> Result<Option<f64>, UrdfError> {
+    pub fn number(&self, node: Node<'_, '_>, name: &str) -> Result<Option<f64>, Error> {
         Ok(self.numbers::<1>(node, name)?.map(|[number]| number))
     }
 
     /// Returns an attribute as a number that must be there and positive.
-    pub fn positive(&self, node: Node<'_, '_>, name: &str) -> Result<f64, UrdfError> {
+    pub fn positive(&self, node: Node<'_, '_>, name: &str) -> Result<f64, Error> {
         self.required(node, name)?;
         let number = self.number(node, name)?.unwrap_or(0.0);
         if number > 0.0 {
@@ -156,7 +155,7 @@ impl<'a> Source<'a> {
     }
 
     /// Returns an attribute as a vector, `None` if it is missing.
-    pub fn vector(&self, node: Node<'_, '_>, name: &str) -> Result<Option<DVec3>, UrdfError> {
+    pub fn vector(&self, node: Node<'_, '_>, name: &str) -> Result<Option<DVec3>, Error> {
         Ok(self.numbers::<3>(node, name)?.map(DVec3::from_array))
     }
 }

@@ -1,7 +1,7 @@
 //! One link of a robot: its inertia and its shapes.
 
-use super::UrdfError;
 use super::document::{Source, child};
+use crate::Error;
 use crate::scene::positive_semidefinite;
 use glam::{DAffine3, DMat3, DQuat, DVec3, EulerRot};
 use roxmltree::Node;
@@ -70,7 +70,7 @@ pub enum Geometry {
 }
 
 /// Reads a `<link>`.
-pub(super) fn read(source: &Source<'_>, node: Node<'_, '_>) -> Result<Link, UrdfError> {
+pub(super) fn read(source: &Source<'_>, node: Node<'_, '_>) -> Result<Link, Error> {
     let of_kind = |kind: &str| node.children().filter(|child| child.tag_name().name() == kind).collect::<Vec<_>>();
     let collision = of_kind("collision");
     let is_visual = collision.is_empty();
@@ -93,7 +93,7 @@ pub(super) fn read(source: &Source<'_>, node: Node<'_, '_>) -> Result<Link, Urdf
 
 /// Reads the `<origin>` of an element: turned by roll, pitch and yaw about the fixed axes x, y, z, then moved. Identity
 /// if there is none.
-pub(super) fn origin(source: &Source<'_>, node: Node<'_, '_>) -> Result<DAffine3, UrdfError> {
+pub(super) fn origin(source: &Source<'_>, node: Node<'_, '_>) -> Result<DAffine3, Error> {
     let Some(origin) = child(node, "origin") else { return Ok(DAffine3::IDENTITY) };
     let translation = source.vector(origin, "xyz")?.unwrap_or(DVec3::ZERO);
     let angles = source.vector(origin, "rpy")?.unwrap_or(DVec3::ZERO);
@@ -101,7 +101,7 @@ pub(super) fn origin(source: &Source<'_>, node: Node<'_, '_>) -> Result<DAffine3
     Ok(DAffine3::from_rotation_translation(rotation, translation))
 }
 
-fn inertial(source: &Source<'_>, node: Node<'_, '_>) -> Result<Inertial, UrdfError> {
+fn inertial(source: &Source<'_>, node: Node<'_, '_>) -> Result<Inertial, Error> {
     let place = origin(source, node)?;
     let mass =
         child(node, "mass").ok_or_else(|| source.error(node.range(), "<inertial> needs <mass value=\"..\"/>"))?;
@@ -112,7 +112,7 @@ fn inertial(source: &Source<'_>, node: Node<'_, '_>) -> Result<Inertial, UrdfErr
     }
     let mut tensor = DMat3::ZERO;
     if let Some(element) = child(node, "inertia") {
-        let number = |name| -> Result<f64, UrdfError> { Ok(source.number(element, name)?.unwrap_or(0.0)) };
+        let number = |name| -> Result<f64, Error> { Ok(source.number(element, name)?.unwrap_or(0.0)) };
         let [xx, yy, zz] = [number("ixx")?, number("iyy")?, number("izz")?];
         let [xy, xz, yz] = [number("ixy")?, number("ixz")?, number("iyz")?];
         let message =
@@ -125,7 +125,7 @@ fn inertial(source: &Source<'_>, node: Node<'_, '_>) -> Result<Inertial, UrdfErr
 }
 
 /// Reads a shape; `None` where it has no size.
-fn shape(source: &Source<'_>, node: Node<'_, '_>) -> Result<Option<Placed>, UrdfError> {
+fn shape(source: &Source<'_>, node: Node<'_, '_>) -> Result<Option<Placed>, Error> {
     let missing = |what: &str| source.error(node.range(), format!("<{}> needs {what}", node.tag_name().name()));
     let geometry = child(node, "geometry").ok_or_else(|| missing("<geometry>"))?;
     let form = geometry.children().find(Node::is_element).ok_or_else(|| missing("a shape in its <geometry>"))?;

@@ -22,7 +22,6 @@
 mod arm;
 mod document;
 mod drawn;
-mod error;
 mod group;
 mod link;
 mod nodes;
@@ -35,7 +34,6 @@ mod text;
 
 pub use arm::{Arm, ArmJoint, Lock, Note};
 pub use drawn::drawn_shapes;
-pub use error::UrdfError;
 pub use link::{Geometry, Inertial, Link, Placed};
 pub use nodes::{ContactNodes, sample};
 pub use robot::{Joint, JointType, Robot};

@@ -5,7 +5,8 @@
 //! edges and tips carry nodes, no two nodes are nearer than the spacing, and hardly a place of the surface is farther
 //! than that from all of them. The same file gives the same nodes.
 
-use super::{Arm, Robot, UrdfError, surface::Surface};
+use super::{Arm, Robot, surface::Surface};
+use crate::Error;
 use crate::random::Random;
 use crate::scene::MAX_CONTACT_NODES;
 use glam::{DVec3, IVec3};
@@ -39,17 +40,16 @@ pub struct ContactNodes {
 /// for.
 ///
 /// # Errors
-/// [`UrdfError::Invalid`] if a mesh cannot be read, [`UrdfError::Request`] if there are no nodes or more than a scene
-/// takes.
-pub fn sample(robot: &Robot, arm: &Arm, spacing: f64, packages: Option<&Path>) -> Result<ContactNodes, UrdfError> {
-    let refuse = |message: String| UrdfError::Request { path: robot.path.clone(), message };
+/// If a mesh cannot be read, or there are no nodes or more than a scene takes.
+pub fn sample(robot: &Robot, arm: &Arm, spacing: f64, packages: Option<&Path>) -> Result<ContactNodes, Error> {
+    let refuse = |message: String| Error::at(&robot.path, message);
     if !(spacing >= LEAST_SPACING && spacing.is_finite()) {
         return Err(refuse(format!("the spacing is {spacing} m: it must be at least {LEAST_SPACING} m")));
     }
     let source = robot.source();
     let mut surfaces = Vec::new();
     for joint in &arm.joints {
-        let of_joint: Result<Vec<Surface>, UrdfError> =
+        let of_joint: Result<Vec<Surface>, Error> =
             joint.shapes.iter().map(|shape| Surface::of(shape, &source, packages)).collect();
         surfaces.push(of_joint?);
     }

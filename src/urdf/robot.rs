@@ -1,7 +1,8 @@
 //! Links and joints as the file has them.
 
 use super::document::{Source, child, read_text};
-use super::{Link, UrdfError, link};
+use super::{Link, link};
+use crate::Error;
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 use std::{
@@ -89,8 +90,8 @@ impl Robot {
     /// Reads the robot file at `path`. No mesh is opened.
     ///
     /// # Errors
-    /// [`UrdfError::Unreadable`] if the file cannot be read, [`UrdfError::Invalid`] if it is no URDF.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, UrdfError> {
+    /// If the file cannot be read, or is no URDF.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         Self::parse(read_text(path)?, path)
     }
@@ -98,8 +99,8 @@ impl Robot {
     /// Reads a robot from text; messages name `path`.
     ///
     /// # Errors
-    /// [`UrdfError::Invalid`] if the text is no URDF.
-    pub fn parse(text: String, path: impl AsRef<Path>) -> Result<Self, UrdfError> {
+    /// If the text is no URDF.
+    pub fn parse(text: String, path: impl AsRef<Path>) -> Result<Self, Error> {
         let source = Source { path: path.as_ref(), text: &text };
         let document = source.parse()?;
         let root = document.root_element();
@@ -157,7 +158,7 @@ impl Robot {
     }
 }
 
-fn joint(source: &Source<'_>, node: Node<'_, '_>, links: &HashMap<String, usize>) -> Result<Joint, UrdfError> {
+fn joint(source: &Source<'_>, node: Node<'_, '_>, links: &HashMap<String, usize>) -> Result<Joint, Error> {
     let name = source.required(node, "name")?.to_owned();
     let kind = source.required(node, "type")?;
     let kind = JointType::named(kind).ok_or_else(|| {

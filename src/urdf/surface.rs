@@ -1,7 +1,7 @@
 //! Surfaces of shapes, as triangles.
 
-use super::{Geometry, Placed, UrdfError, document::Source, package};
-use crate::{object, proxy, scene::Placement};
+use super::{Geometry, Placed, document::Source, package};
+use crate::{Error, object, proxy, scene::Placement};
 use glam::DVec3;
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub(super) struct Surface {
 
 impl Surface {
     /// Returns the surface of `shape` in the frame in which it is placed.
-    pub fn of(shape: &Placed, source: &Source<'_>, packages: Option<&Path>) -> Result<Self, UrdfError> {
+    pub fn of(shape: &Placed, source: &Source<'_>, packages: Option<&Path>) -> Result<Self, Error> {
         let refuse = |message: String| source.error(shape.span.clone(), message);
         let mut surface = match &shape.geometry {
             Geometry::Box(size) => Self::from(proxy::block(*size)),

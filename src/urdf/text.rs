@@ -1,7 +1,8 @@
 //! The scene file of an arm, as a person would have written it.
 
-use super::{Arm, ArmJoint, ContactNodes, Robot, UrdfError};
+use super::{Arm, ArmJoint, ContactNodes, Robot};
 use super::{practice::Practice, shape};
+use crate::Error;
 use crate::proxy::{Chain, Press};
 use crate::scene::{JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
 use crate::toml_text::{coarse, comment, entry, heading, list, number, significant, vector};
@@ -24,26 +25,23 @@ const TIP_FORCE: f64 = 10.0;
 /// `command`: what made it, for the head of the file.
 ///
 /// # Errors
-/// [`UrdfError::Request`] if there is no contact node, [`UrdfError::Scene`] if the text is no valid scene, a fault of
-/// this program.
+/// If there is no contact node, or the text is no valid scene, a fault of this program.
 pub fn write_scene(
     robot: &Robot,
     arm: &Arm,
     nodes: &ContactNodes,
     shapes: &[LinkShape],
     command: &str,
-) -> Result<String, UrdfError> {
+) -> Result<String, Error> {
     let proxy = proxy(arm, nodes);
-    let no_nodes = || UrdfError::Request {
-        path: robot.path.clone(),
-        message: "the arm has no contact node, and could touch nothing".into(),
-    };
+    let no_nodes = || Error::at(&robot.path, "the arm has no contact node, and could touch nothing");
     let practice = Practice::new(&Chain::new(&proxy)).ok_or_else(no_nodes)?;
     let mut text = String::new();
     // Writing to a string fails only where memory does.
     let _ = write(&mut text, robot, arm, &proxy, nodes, &practice, command);
     let _ = shape::write(&mut text, &proxy, shapes);
-    Scene::parse(&text, robot.path.with_extension("toml"))?;
+    Scene::parse(&text, robot.path.with_extension("toml"))
+        .map_err(|error| error.within("the scene made of the robot is not valid, a fault of this program"))?;
     Ok(text)
 }
 

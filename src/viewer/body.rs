@@ -6,10 +6,10 @@ use crate::{
     contact::Status,
     gpu::{Context, FrameMethod, FrameUpdate, GpuError},
     render::{
-        graphics::{ContactForces, Smoothing},
+        graphics::{ContactForces, DrawnForces},
         session::Latest,
     },
-    scene::GraphicsEffects,
+    scene::{GraphicsEffects, GraphicsSpec},
 };
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -26,8 +26,7 @@ pub struct Body {
     /// dataset where these touch nothing.
     pub extremes: [f64; 2],
     contact: Arc<ContactForces>,
-    forces: Vec<DVec3>,
-    smoothing: Option<Smoothing>,
+    forces: DrawnForces,
     /// Time between two frames of the object (s).
     period: f64,
     /// Time that the object lags behind (s).
@@ -49,16 +48,19 @@ impl Body {
         else {
             return Ok(None);
         };
-        let (nodes, period) = (object.rest.len(), 1.0 / graphics.rate);
-        let update = FrameUpdate::new(Arc::clone(context), object, period, FrameMethod::suitable(object), effects)?;
+        let relaxation = loaded.setup.scene.haptics.relaxation.as_ref();
+        let (nodes, method) = (object.rest.len(), FrameMethod::suitable(object));
+        let graphics = GraphicsSpec { effects: *effects, ..graphics.clone() };
+        let period = 1.0 / graphics.rate;
+        let update =
+            FrameUpdate::remembering(Arc::clone(context), object, period, method, effects, relaxation.is_some())?;
         Ok(Some(Self {
             surface: Surface::new(context, object, &update)?,
             update,
             rest: object.rest.iter().map(|point| point.as_vec3()).collect(),
             extremes: extremes(loaded),
             contact: Arc::clone(contact),
-            forces: vec![DVec3::ZERO; nodes],
-            smoothing: effects.smoothing.map(|time| Smoothing::new(time, period, nodes)),
+            forces: DrawnForces::new(nodes, &graphics, relaxation),
             period,
             owed: 0.0,
         }))
@@ -69,16 +71,13 @@ impl Body {
     /// # Errors
     /// When the device fails.
     pub fn advance(&mut self, latest: &Latest, elapsed: f64) -> Result<(), GpuError> {
-        self.contact.at(&latest.proxy, latest.share, &mut self.forces);
+        self.forces.touch(&self.contact, latest);
         self.owed += elapsed;
         let due = (self.owed / self.period).floor();
         self.owed -= due * self.period;
         for _ in 0..(due as usize).min(MOST_FRAMES) {
-            let forces = match &mut self.smoothing {
-                Some(smoothing) => smoothing.toward(&self.forces),
-                None => &self.forces,
-            };
-            self.update.step(forces)?;
+            let [contact, past] = self.forces.frame();
+            self.update.step_remembering(contact, past)?;
         }
         Ok(())
     }
@@ -91,7 +90,7 @@ impl Body {
 
     /// Nodes with a contact force, and that force (N).
     pub fn contacts(&self) -> impl Iterator<Item = (usize, DVec3)> {
-        self.forces.iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
+        self.forces.contact().iter().copied().enumerate().filter(|(_, force)| *force != DVec3::ZERO)
     }
 }
 

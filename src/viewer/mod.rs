@@ -26,6 +26,7 @@ mod column;
 mod controls;
 mod feel;
 mod files;
+mod friction;
 mod gains;
 mod guide;
 mod history;

@@ -401,6 +401,11 @@ fn felt(ui: &mut Ui, session: &mut Session) {
         format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
     });
     ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
+    if let Some(dent) = tick.dent {
+        ui.separator();
+        ui.label(RichText::new(format!("dent {:.0} %", 100.0 * dent)).small())
+            .on_hover_text("What would stay of the dent if the arm let go now, or is left since it did");
+    }
     if let Some(scene) = &session.loaded.live {
         ui.separator();
         let text = scene.notice().unwrap_or("contact is solved in every tick, before the surface at rest");

@@ -10,14 +10,14 @@ use super::{
     theme::{self, CURVE, DASHES, FINE_CURVE, FINE_GAP, GAP, GROUP_GAP, HAIRLINE, SAMPLE, SPAN_WIDTH},
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     dataset::replace_file,
     draw::canvas::Canvas,
     render::{
         timing::{Durations, Percentiles},
         trace::Tick,
     },
-    report::{self, ReportError},
+    report,
 };
 use eframe::egui::{self, Button, RichText, Ui, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
@@ -290,7 +290,7 @@ impl Plots {
         Ok(format!("wrote {}", file.display()))
     }
 
-    fn write_png(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, ReportError> {
+    fn write_png(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, Error> {
         let history = self.frozen.as_ref().unwrap_or(history);
         let trace = history.trace(loaded);
         let write = |name: &str, canvas: &Canvas| {

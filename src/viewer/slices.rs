@@ -3,6 +3,7 @@
 
 use super::{
     column::{Column, status_colour},
+    friction::friction_ellipse,
     history::History,
     legend,
     loaded::Loaded,
@@ -197,6 +198,7 @@ impl Slices {
             .collect();
         let inside = grid.clamp(q);
         let (here, outside) = (place(&inside), inside != *q);
+        let friction = history.last().and_then(|tick| friction_ellipse(loaded, tick, &inside, self.axes));
         let dataset = &loaded.dataset;
         let column = self.column;
         let (axes, lines) = (self.axes, self.lines.clone());
@@ -229,6 +231,9 @@ impl Slices {
             if !flagged.is_empty() {
                 let marks = Points::new("not converged", flagged).shape(MarkerShape::Cross).radius(CROSS);
                 plot.points(marks.color(palette.flagged).allow_hover(false));
+            }
+            if let Some(ellipse) = friction {
+                plot.line(Line::new("friction", ellipse).color(palette.axis).width(FINE_CURVE).allow_hover(false));
             }
             for (radius, colour) in palette::ring(&palette, outside) {
                 plot.points(Points::new("q", vec![here]).radius(radius).color(colour).allow_hover(false));

@@ -6,7 +6,8 @@ use crate::{
 };
 use haptize::{
     Error, JointVector,
-    logs::{Effort, Mapping, import},
+    gridize::{GridizeOptions, Reversals, gridize_sliding},
+    logs::{Effort, Keep, Mapping, import},
     proxy::Chain,
     ros::{Course, JointState, JointStateTable, JointStateWriter, is_mcap, topics},
     scan::{Plan, Trajectory, labels},
@@ -91,6 +92,43 @@ fn drop_outs_are_counted_and_efforts_become_contact_torques() {
     );
     assert_eq!(imported.report.dropped[0].rows, 2);
     assert!(imported.samples.torques.iter().all(|torque| *torque == -0.5));
+}
+
+#[test]
+fn strokes_in_a_recording_of_a_robot_tell_friction_as_those_in_a_table_do() {
+    /// Of the joint (N m).
+    const FRICTION: f64 = 0.3;
+    let folder = tempfile::tempdir().unwrap();
+    let row = |k: u32| {
+        let phase = 2e-3 * f64::from(k);
+        let (q, up) = (0.5 - 0.5 * phase.cos(), phase.sin() > 0.0);
+        (q, -2.0 * q - if up { FRICTION } else { -FRICTION })
+    };
+    let rows = (0..20_000_u32).map(|k| (k, row(k)));
+    let states: Vec<(&str, JointState)> =
+        rows.clone().map(|(k, (q, torque))| ("/joint_states", state(u64::from(k), &["x"], &[q], &[torque]))).collect();
+    let recording = file(folder.path(), "log.mcap", &states);
+    let table = folder.path().join("log.csv");
+    let lines: String = rows.map(|(k, (q, torque))| format!("{},{q},{torque}\n", f64::from(k) / 1e3)).collect();
+    fs::write(&table, format!("time,position x,effort x\n{lines}")).unwrap();
+
+    let mut mapping = Mapping::of_joint_states(&["x".to_owned()], "/joint_states", Effort::Contact);
+    mapping.torque.cell = vec![0.01];
+    (mapping.torque.keep, mapping.torque.friction, mapping.torque.still) = (Keep::Average, true, 0.02);
+    let [of_robot, of_table] = [recording, table].map(|path| import(&mapping, &[path], &mut |_| ()).unwrap());
+    assert_eq!(of_robot.histories, of_table.histories);
+    let reversals = Reversals { histories: &of_robot.histories, lead: 0, cell: &mapping.torque.cell };
+    let options = GridizeOptions {
+        steps: vec![0.05],
+        epsilon: None,
+        interpolation: haptize::gridize::Interpolation::Linear,
+        smooth: false,
+    };
+    let (dataset, _) = gridize_sliding(&of_robot.samples.joints, &reversals, &options).unwrap();
+    let forces = &dataset.slip.as_ref().unwrap().normal_force;
+    assert!(forces.len() > 15 && forces.iter().all(|force| (f64::from(*force) / FRICTION - 1.0).abs() < 0.05));
+    let [with, without] = dataset.provenance.friction.unwrap().predicted[0];
+    assert!(with < 0.1 * FRICTION && (without / FRICTION - 1.0).abs() < 0.05, "{with} {without}");
 }
 
 #[test]

@@ -473,7 +473,7 @@ fn a_slow_frame_rate_does_not_hold_up_the_end_of_a_session() {
     let setup = Setup::new(&data).unwrap();
     let slow = GraphicsSpec { rate: 0.05, effects: GraphicsEffects::default() };
     let forces = setup.contact_forces(&data).unwrap().unwrap();
-    let mut graphics = Graphics::new(forces, setup.object.as_ref().unwrap(), &slow).unwrap();
+    let mut graphics = Graphics::new(forces, setup.object.as_ref().unwrap(), &slow, None).unwrap();
     let mut hand = setup.hand(Motion::through(&setup.scene.motion.press, 3).unwrap()).unwrap();
     let plan = setup.plan(&data, 0.1, 0);
     let began = Instant::now();

@@ -6,7 +6,7 @@ use haptize::{
     dataset::Dataset,
     device::Motion,
     gridize::{
-        GridizeOptions, Interpolation, gridize,
+        GridizeOptions, Interpolation, Reversals, gridize, gridize_sliding,
         prediction::{held_out, predict},
     },
     logs::{Imported, Keep, Mapping, import},
@@ -102,7 +102,7 @@ fn a_real_instrument_is_predicted_about_as_well_as_it_repeats_itself() {
     };
     let mapping = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("datasets/instrument.toml");
     let mut mapping = Mapping::load(&mapping).unwrap();
-    let Imported { samples, branches, report, .. } = import(&mapping, &logs, &mut |_| {}).unwrap();
+    let Imported { samples, branches, histories, report } = import(&mapping, &logs, &mut |_| {}).unwrap();
     let cells = report.cells.unwrap();
     assert!(report.rows > 190_000 && samples.len() > 500, "{} rows, {} samples", report.rows, samples.len());
     // Friction: the torque on the way up is lower than on the way down, by far more than repeating a pass changes it.
@@ -117,9 +117,16 @@ fn a_real_instrument_is_predicted_about_as_well_as_it_repeats_itself() {
         assert!(error < 1.1 * repeated && error > 0.1 * repeated, "joint {joint}: {error} {repeated}");
     }
     assert!(held_out.predicted > held_out.samples / 2);
+    // Friction tells one direction from the other. Strokes that were held out are predicted with it.
+    let reversals = Reversals { histories: &histories, lead: 0, cell: &mapping.torque.cell };
+    let (dataset, _) = gridize_sliding(&samples.joints, &reversals, &options(0.02, 0.0)).unwrap();
+    let friction = dataset.provenance.friction.unwrap();
+    println!("{friction:?}");
+    let [with, without] = friction.predicted[0];
+    assert!(friction.strokes > 90 && with < 0.016 && without > 0.035, "{friction:?}");
     // A whole run under a load that no other run had is harder: nothing was measured between its neighbours, one
     // direction of motion at a time. It is predicted to a tenth of the range.
-    mapping.torque.keep = Keep::Forward;
+    (mapping.torque.keep, mapping.torque.friction) = (Keep::Forward, false);
     let (rest, run): (Vec<_>, Vec<_>) = logs.iter().cloned().partition(|log| !log.ends_with("tool5_04.txt"));
     let rest = import(&mapping, &rest, &mut |_| {}).unwrap().samples;
     let run = import(&mapping, &run, &mut |_| {}).unwrap().samples;

@@ -99,7 +99,8 @@ fn kill_at_random(backend: &str, lines: usize) {
             bake.kill().unwrap();
             bake.wait().unwrap();
             killed += 1;
-            *if folder.join("x.haptize.growing").exists() {
+            let is_temporary = |entry: std::fs::DirEntry| entry.file_name().to_string_lossy().ends_with(".tmp");
+            *if std::fs::read_dir(folder).unwrap().flatten().any(is_temporary) {
                 &mut met.assembling
             } else if folder.join("x.haptize.part").exists() {
                 &mut met.baking

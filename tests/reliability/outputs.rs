@@ -57,22 +57,6 @@ fn a_bake_through_a_link_replaces_the_file_on_its_own_disk() {
     assert_eq!(names(home.path()), before);
 }
 
-#[test]
-fn what_is_in_the_way_of_a_growing_file_is_not_lost() {
-    let home = home();
-    let path = |name: &str| home.path().join(name);
-    std::fs::write(path("y.haptize.growing"), "a thesis").unwrap();
-    refused(home.path(), &["bake", "scene.toml", "-o", "y.haptize"], "not a dataset");
-    assert_eq!(std::fs::read(path("y.haptize.growing")).unwrap(), b"a thesis");
-    #[cfg(unix)]
-    {
-        std::os::unix::fs::symlink("x.haptize", path("z.haptize.growing")).unwrap();
-        let before = std::fs::read(path("x.haptize")).unwrap();
-        refused(home.path(), &["bake", "scene.toml", "-o", "z.haptize"], "move it away");
-        assert!(std::fs::read(path("x.haptize")).unwrap() == before && path("z.haptize.growing").is_symlink());
-    }
-}
-
 /// Opened, a pipe that nobody writes to is waited for without end.
 #[cfg(unix)]
 #[test]

@@ -11,7 +11,13 @@ use haptize::{
     gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver},
     object::{Factor, Object},
     proxy::Chain,
-    render::{coupling::Coupling, npmi, session, setup::Setup, trace::Trace},
+    render::{
+        coupling::Coupling,
+        npmi,
+        session::{self, Latest},
+        setup::Setup,
+        trace::Trace,
+    },
     scene::{ContactLaw, ContactSpec, EFFECTS, Effect, Rendering, Scene},
     sweep,
 };
@@ -65,7 +71,7 @@ impl Baked {
     fn drawn(&self, places: &[(JointVector, f64)]) -> Vec<Vec<DVec3>> {
         let mut graphics = self.setup.graphics(&self.data).unwrap().unwrap();
         let frame = |(q, share): &(JointVector, f64)| {
-            graphics.frame(q, *share);
+            graphics.frame(&Latest { proxy: *q, share: *share, ..Latest::default() });
             graphics.motion().nodes().collect()
         };
         places.iter().map(frame).collect()
@@ -271,6 +277,28 @@ fn made<T>(context: &Context, make: impl FnOnce() -> T) -> (T, (BTreeMap<String,
     }
     labels.retain(|_, count| *count > 0);
     (thing, (labels, pipelines - before.1))
+}
+
+#[test]
+fn on_the_gpu_the_body_force_of_a_past_acts_as_contact_forces_do() {
+    let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
+    let object = Object::build(&sphere().object).unwrap();
+    let (method, effects) = (FrameMethod::Inverse, haptize::scene::GraphicsEffects::default());
+    let of = |remembers| {
+        FrameUpdate::remembering(Arc::clone(&context), &object, 1.0 / 60.0, method, &effects, remembers).unwrap()
+    };
+    let (mut remembering, mut plain) = (of(true), of(false));
+    let force = |k: usize| DVec3::new(0.01 * (k % 5) as f64, -0.02 * (k % 3) as f64, -0.03 * (k % 7) as f64);
+    let contact: Vec<DVec3> = (0..object.rest.len()).map(force).collect();
+    let past: Vec<DVec3> = contact.iter().rev().copied().collect();
+    let sum: Vec<DVec3> = contact.iter().zip(&past).map(|(a, b)| *a + *b).collect();
+    for _ in 0..5 {
+        remembering.step_remembering(&contact, &past).unwrap();
+        plain.step(&sum).unwrap();
+    }
+    let (moved, _) = plain.read().unwrap();
+    assert_eq!(remembering.read().unwrap().0, moved);
+    assert!(moved.iter().any(|u| u.length() > 1e-5));
 }
 
 #[test]

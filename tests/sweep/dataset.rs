@@ -70,7 +70,13 @@ fn sample() -> Dataset {
                 misfit: 0.01,
                 held_out: Some(0.02),
             }),
-            friction: Some(haptize::dataset::IdentifiedFriction { coefficient: 0.4, strokes: 6, deviation: 0.02 }),
+            friction: Some(haptize::dataset::IdentifiedFriction {
+                coefficient: 0.4,
+                strokes: 6,
+                deviation: 0.02,
+                stiffness: Some(300.0),
+                predicted: vec![[0.1, 0.4]],
+            }),
             aim: None,
         },
     }
@@ -78,17 +84,8 @@ fn sample() -> Dataset {
 
 /// The least that a dataset can be: what a scanned object has.
 fn bare() -> Dataset {
-    Dataset {
-        energy: None,
-        tangent: None,
-        gap: None,
-        residual: None,
-        iterations: None,
-        contacts: None,
-        slip: None,
-        surface: None,
-        ..sample()
-    }
+    let Dataset { grid, torque, status, scene, provenance, .. } = sample();
+    Dataset { scene, provenance, ..Dataset::bare(grid, torque, status) }
 }
 
 fn bits<T: bytemuck::Pod>(column: &[T]) -> Vec<u8> {

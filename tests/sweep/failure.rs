@@ -42,10 +42,12 @@ fn a_file_of_another_kind_is_not_replaced() {
 fn what_another_process_writes_or_a_link_leads_to_is_left_alone() {
     let folder = Folder::new();
     let begin = || bake(&sweep(), &mut MadeUp::default(), &folder.output(), false, 10, usize::MAX);
-    let claim = haptize::dataset::Claim::new(&folder.output()).unwrap().unwrap();
+    let part = std::fs::File::create(folder.part()).unwrap();
+    part.lock().unwrap();
     let error = begin().unwrap_err();
     assert!(error.to_string().contains("another process is writing"), "{error}");
-    drop(claim);
+    drop(part);
+    std::fs::remove_file(folder.part()).unwrap();
     #[cfg(unix)]
     {
         let target = folder.0.path().join("notes.txt");

@@ -176,9 +176,9 @@ fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
     let scene = Scene::parse(&text(), "a.toml").unwrap();
     let stop = AtomicBool::new(false);
     let pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
-    let choice = pilot.choose(&scene, usize::MAX, BackendChoice::Cpu).unwrap();
+    let choice = pilot.choose(&scene, usize::MAX).unwrap();
     assert!(pilot.prospects.iter().all(|prospect| prospect.points >= pilot.prospects[0].points));
-    assert!(pilot.choose(&scene, 10, BackendChoice::Cpu).is_err());
+    assert!(pilot.choose(&scene, 10).is_err());
     let bake = haptize::sweep::Bake {
         scene: &choice.scene,
         backend: BackendChoice::Cpu,

@@ -52,7 +52,7 @@ fn a_killed_program_is_resumed_to_the_same_numbers() {
     killed.wait().unwrap();
     assert_eq!(folder.names(), ["fine.haptize.part", "fine.toml"]);
     // As if it had been killed once more, while it put the file together.
-    std::fs::write(folder.0.path().join("fine.haptize.growing"), b"\x02\0\0\0\0\0\0\0{").unwrap();
+    std::fs::write(folder.0.path().join(".haptize-left.tmp"), b"\x02\0\0\0\0\0\0\0{").unwrap();
     let output = program(&folder, &["--resume"]).output().unwrap();
     assert!(output.status.success());
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -304,3 +304,26 @@ fn effects_of_tick_and_frame_are_left_out_and_taken_back() {
     window.reach("Varying inertia");
     assert_eq!(window.harness.state().error(), None);
 }
+
+#[test]
+fn an_object_that_relaxes_and_rubs_shows_its_dent_and_the_ellipse_of_friction() {
+    let folder = tempfile::tempdir().unwrap();
+    let open = |name: &str, added: &str| {
+        let file = folder.path().join(name);
+        let text = small_scene().replace("interpolation = \"linear\"", "interpolation = \"potential\"") + added;
+        baked(&Scene::parse(&text, name).unwrap()).unwrap().0.save(&file).unwrap();
+        let mut window = Window::open(&Start::File(file), [1200.0, 900.0], Theme::Light);
+        assert_eq!(window.harness.state().error(), None);
+        window.click("Press");
+        window.pass(2.2);
+        assert!(window.shows("nodes in contact"), "{name}");
+        (window.shows("dent "), window.picture_of("Plane of C-space"))
+    };
+    let (shows_dent, plane) = open("elastic.haptize", "");
+    assert!(!shows_dent);
+    let (shows_dent, _) = open("relaxing.haptize", "[object.relaxation]\nterms = [[0.5, 0.1], [0.2, 2.0]]\n");
+    assert!(shows_dent);
+    let (_, rubbing) = open("rubbing.haptize", "[haptics.friction]\ncoefficient = 0.4\n");
+    let differing = plane.pixels().zip(rubbing.pixels()).filter(|(a, b)| a != b).count();
+    assert!(differing > 50, "no ellipse: {differing}");
+}

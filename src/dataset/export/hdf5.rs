@@ -11,7 +11,7 @@
 
 use super::{
     super::{Dataset, Grid, error::unwritable, file, replace_file},
-    meaning::{Meaning, lines, lines_name},
+    lines, lines_name,
 };
 use crate::{Error, memory};
 use hdf5_writer::{AttributeBuilder, ByteOrder, DatasetBuilder, Datatype, Hdf5Builder, Hdf5WritePlan, WriteOptions};
@@ -39,11 +39,19 @@ fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {
     let grid = &dataset.grid;
     let (mut builder, mut over_grid) = (Hdf5Builder::new(), Vec::new());
     for (array, tensor) in file::arrays(dataset) {
-        let meaning = Meaning::of(array, grid);
-        over_grid.extend((meaning.of_grid > 0).then_some(tensor.name));
+        let (axes, of_grid) = array.axes(grid);
         let shape: Vec<u64> = tensor.shape.iter().map(|&count| count as u64).collect();
-        let array = DatasetBuilder::new(tensor.name, datatype(tensor.dtype)?, shape).raw_data(tensor.contents);
-        builder = builder.dataset(described(array, &meaning)?);
+        let mut described = DatasetBuilder::new(tensor.name, datatype(tensor.dtype)?, shape)
+            .raw_data(tensor.contents)
+            .attribute(AttributeBuilder::fixed_string("units", array.unit(grid)))
+            .attribute(AttributeBuilder::vlen_strings("DIMENSION_LABELS", &axes)?);
+        if of_grid > 0 {
+            over_grid.push(tensor.name);
+            let scales = (0..axes.len()).map(|k| if k < of_grid { vec![lines_name(k)] } else { vec![] });
+            described =
+                described.attribute(AttributeBuilder::vlen_object_references("DIMENSION_LIST", scales.collect()));
+        }
+        builder = builder.dataset(described);
     }
     for k in 0..grid.joints() {
         builder = builder.dataset(scale(grid, k, &over_grid)?);
@@ -57,18 +65,6 @@ fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {
         .dataset(text("scene", &dataset.scene)?)
         .dataset(text("provenance", &provenance)?)
         .into_plan()
-}
-
-/// `array` with its unit, the names of its axes, and the scales of those that are the grid's.
-fn described(array: DatasetBuilder, meaning: &Meaning) -> hdf5_writer::Result<DatasetBuilder> {
-    let array = array
-        .attribute(AttributeBuilder::fixed_string("units", &meaning.unit))
-        .attribute(AttributeBuilder::vlen_strings("DIMENSION_LABELS", &meaning.axes)?);
-    if meaning.of_grid == 0 {
-        return Ok(array);
-    }
-    let scales = (0..meaning.axes.len()).map(|k| if k < meaning.of_grid { vec![lines_name(k)] } else { vec![] });
-    Ok(array.attribute(AttributeBuilder::vlen_object_references("DIMENSION_LIST", scales.collect())))
 }
 
 /// The grid lines of axis `k` as a scale of the arrays `over_grid`.

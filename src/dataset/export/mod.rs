@@ -2,10 +2,9 @@
 
 mod csv;
 mod hdf5;
-mod meaning;
 mod npz;
 
-use super::Dataset;
+use super::{Axis, Dataset};
 use crate::Error;
 use std::path::{Path, PathBuf};
 
@@ -42,6 +41,16 @@ impl Format {
     pub fn beside(self, path: &Path) -> Option<PathBuf> {
         (self == Self::Csv).then(|| csv::contacts_file(path))
     }
+}
+
+/// Name of the array with the grid lines of axis `k`.
+fn lines_name(k: usize) -> String {
+    format!("q{}", k + 1)
+}
+
+/// Returns the coordinates of the grid lines of `axis`.
+fn lines(axis: &Axis) -> impl ExactSizeIterator<Item = f64> + '_ {
+    (0..axis.count).map(|line| axis.coordinate(line))
 }
 
 impl Dataset {

@@ -6,8 +6,8 @@
 //! not compressed: numbers of a smooth field hardly are.
 
 use super::{
-    super::{Dataset, error::unwritable, file, replace_file},
-    meaning::{Meaning, lines, lines_name},
+    super::{Dataset, Stored, error::unwritable, file, replace_file, stored::units},
+    lines, lines_name,
 };
 use crate::Error;
 use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
@@ -114,9 +114,10 @@ fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Resul
 /// Each array of numbers with its unit, and with its axes.
 fn meanings(dataset: &Dataset) -> (Vec<[String; 2]>, Vec<[String; 2]>) {
     let grid = &dataset.grid;
-    let described = |(name, Meaning { unit, axes, .. }): (&str, Meaning)| (name.to_owned(), unit, axes.join(", "));
-    let arrays = file::arrays(dataset).map(|(array, tensor)| (tensor.name, Meaning::of(array, grid)));
-    let arrays = arrays.chain([("q", Meaning::of_configurations(grid))]).map(described);
+    let axes = |array: Stored| array.axes(grid).0.join(", ");
+    let arrays = file::arrays(dataset).map(|(array, _)| (array.name().to_owned(), array.unit(grid), axes(array)));
+    let configurations = ("q".to_owned(), units(grid, |axis| axis.unit.clone()), axes(Stored::Torque));
+    let arrays = arrays.chain([configurations]);
     let lines = grid.axes.iter().enumerate().map(|(k, axis)| (lines_name(k), axis.unit.clone(), axis.name.clone()));
     arrays.chain(lines).map(|(name, unit, axes)| ([name.clone(), unit], [name, axes])).unzip()
 }

@@ -38,7 +38,7 @@ use crate::{
     Error,
     contact::Status,
     dataset::{
-        Dataset, Grid, Heading, Kind, Provenance, Surface, Target, Tensor, check_place,
+        Dataset, Grid, Heading, Kind, Provenance, Surface, Tensor, check_place,
         error::{damaged, inconsistent, no_memory},
         read::Container,
         surface_tensors, write_container,
@@ -73,22 +73,21 @@ fn check_memory(grid: &Grid) -> Result<(), Shortage> {
 }
 
 impl Store {
-    /// Writes the refined dataset over this store, replacing the file `target` whole or not at all. Arguments as in
+    /// Writes the refined dataset over this store, replacing the file at `path` whole or not at all. Arguments as in
     /// [`Dataset::refined`], of which nothing is made at the points of `grid`.
     ///
     /// # Errors
     /// As [`Dataset::save`].
-    pub fn save<'a>(
+    pub fn save(
         &self,
         grid: &Grid,
         surface: Option<&Surface>,
         scene: &str,
         provenance: &Provenance,
-        target: impl Into<Target<'a>>,
+        path: &Path,
     ) -> Result<(), Error> {
-        let target = target.into();
-        check_place(target.path())?;
-        save(self, Heading { grid, provenance, scene }, surface, target)
+        check_place(path)?;
+        save(self, Heading { grid, provenance, scene }, surface, path)
     }
 }
 
@@ -125,33 +124,26 @@ impl Dataset {
             }
         }
         Self {
-            torque: torque.into(),
             energy: Some(energy.into()),
-            tangent: None,
             gap: Some(gap.into()),
-            status: status.into(),
-            residual: None,
-            iterations: None,
-            contacts: None,
-            slip: None,
             surface,
             refinement: Some(store),
-            grid,
             scene,
             provenance,
+            ..Self::bare(grid, torque, status)
         }
     }
 }
 
-/// Writes the dataset that `store` refines, replacing the file `target` whole or not at all.
+/// Writes the dataset that `store` refines, replacing the file at `path` whole or not at all.
 pub(in crate::dataset) fn save(
     store: &Store,
     heading: Heading<'_>,
     surface: Option<&Surface>,
-    target: Target<'_>,
+    path: &Path,
 ) -> Result<(), Error> {
     let shape = Shape { levels: store.space.levels(), order: ORDER.to_owned() };
-    let shape = serde_json::to_string(&shape).map_err(|error| inconsistent(target.path(), error))?;
+    let shape = serde_json::to_string(&shape).map_err(|error| inconsistent(path, error))?;
     let blocks = store.blocks();
     let keys: Vec<u64> = blocks.iter().map(|(key, _)| *key).collect();
     let nodes = || blocks.iter().map(|(_, block)| block.nodes());
@@ -172,7 +164,7 @@ pub(in crate::dataset) fn save(
         tensors.push(Tensor::new::<u16>("node_slips", vec![gap.len(), wide], bytemuck::cast_slice(&slips)));
     }
     tensors.extend(surface.into_iter().flat_map(|surface| surface_tensors(heading.grid, surface)));
-    write_container(target, Kind { format: FORMAT, store: Some(&shape) }, heading, tensors)
+    write_container(path, Kind { format: FORMAT, store: Some(&shape) }, heading, tensors)
 }
 
 /// Makes a dataset of a file whose header and checksum are sound.

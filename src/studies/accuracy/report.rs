@@ -2,6 +2,7 @@
 
 use super::{Accuracy, Row, Study};
 use crate::{
+    Error,
     csv::{Table, quoted},
     draw::{
         canvas::Canvas,
@@ -9,7 +10,7 @@ use crate::{
         diagram::{Diagram, Series},
         plot::{Entry, Mark},
     },
-    report::{ReportError, write, write_both},
+    report::{write, write_both},
     scene::ContactLaw,
 };
 use std::{
@@ -31,8 +32,8 @@ pub const FILES: [&str; 7] = [
 /// Writes [`FILES`] into `folder`, and returns their paths.
 ///
 /// # Errors
-/// [`ReportError::Write`] when a file cannot be written.
-pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, ReportError> {
+/// When a file cannot be written.
+pub fn write_all(folder: &Path, accuracy: &Accuracy) -> Result<Vec<PathBuf>, Error> {
     let mut files = Vec::new();
     files.extend(write_both(folder, "accuracy-spacing", &spacing(accuracy))?);
     files.extend(write_both(folder, "accuracy-time", &time(accuracy))?);

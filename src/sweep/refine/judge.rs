@@ -7,10 +7,9 @@
 
 use super::nodebook::HeldNodes;
 use crate::{
-    Error, JointVector,
     contact::{Model, Solvers, Status},
     dataset::{InterpolationError, MeasuredError},
-    scene::{Interpolation, Scene},
+    scene::Interpolation,
     store::Store,
     sweep::{
         lowest::{self, Lattice},
@@ -18,54 +17,19 @@ use crate::{
     },
 };
 
-/// Random configurations, solved directly, with which interpolations are compared.
-pub struct Judge(pub(super) Reference);
-
-impl Judge {
-    /// Draws configurations in the grid of `scene` until `contacts` of them are in contact, the same ones every time
-    /// for the same `seed`.
-    ///
-    /// # Errors
-    /// When nothing touches.
-    pub fn new(scene: &Scene, model: &Model<'_>, seed: u64, contacts: usize) -> Result<Self, Error> {
-        Reference::in_contact(scene, model, seed, contacts).map(Self)
-    }
-
-    /// Number of configurations that were solved, free ones among them.
-    #[must_use]
-    pub fn solved(&self) -> usize {
-        self.0.solved()
-    }
-
-    /// Mean number of the object's nodes with a contact force, of all configurations (1).
-    #[must_use]
-    pub fn mean_forces(&self) -> f64 {
-        self.0.mean_forces()
-    }
-
-    /// Rms of the torque (the unit of its norm).
-    #[must_use]
-    pub fn torque(&self) -> f64 {
-        self.0.torque
-    }
-
-    /// Rms error of the torque that `answer` gives, over the rms of the torque (1).
-    pub fn relative_error(&self, answer: impl FnMut(&JointVector) -> JointVector) -> f64 {
-        self.0.errors(answer).0 / self.0.torque
-    }
-
+impl Reference {
     /// Returns the errors of the torque of `store`, and the excess of friction where `model` asks for slips.
     #[must_use]
     pub fn measure(&self, store: &Store, model: &Model<'_>) -> MeasuredError {
-        let errors = self.0.distances(|q| store.sample(q).torque());
+        let errors = self.distances(|q| store.sample(q).torque());
         let interpolation = Interpolation::Potential;
-        let measured = self.0.measured(interpolation, vec![InterpolationError::of(interpolation.name(), errors)]);
-        MeasuredError { friction: self.0.friction_excess(model), ..measured }
+        let measured = self.measured(interpolation, vec![InterpolationError::of(interpolation.name(), errors)]);
+        MeasuredError { friction: self.friction_excess(model), ..measured }
     }
 
     /// Replaces equilibria by lower ones that `solvers` reach from the `nodes` around them.
     pub(super) fn lower(&mut self, solvers: &Solvers<'_>, nodes: &HeldNodes) {
-        let reference = &self.0;
+        let reference = &*self;
         let places: Vec<usize> = (0..reference.places.len()).collect();
         let found = solvers.map(&places, |solver, &k| {
             let (q, here) = (&reference.places[k], reference.result(k));
@@ -80,7 +44,7 @@ impl Judge {
         });
         for (k, lowest) in found.into_iter().enumerate() {
             if let Some(lowest) = lowest {
-                self.0.replace(k, &lowest);
+                self.replace(k, &lowest);
             }
         }
     }

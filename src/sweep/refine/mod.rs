@@ -23,13 +23,11 @@
 mod judge;
 mod nodebook;
 
-pub use judge::Judge;
-
 use super::{
     Lowered,
     lowest::applies,
     node::{Scale, Solved},
-    reference::{REFERENCE_TOLERANCE, tight},
+    reference::{REFERENCE_TOLERANCE, Reference, tight},
     thin_parts,
 };
 use crate::{
@@ -40,6 +38,7 @@ use crate::{
     store::{Nodes, Place, Space, Store, beyond, record::width},
 };
 use nodebook::{HeldNodes, Nodebook, held_bytes};
+use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Standard deviations by which the measured squared error is to be below the aim's (1). Larger: more nodes. Smaller:
@@ -71,8 +70,10 @@ pub struct Refine<'a> {
 }
 
 /// A filled store, and how it was filled.
+#[derive(Serialize)]
 pub struct Refined {
     /// The store.
+    #[serde(skip)]
     pub store: Store,
     /// Nodes in it.
     pub nodes: usize,
@@ -83,6 +84,7 @@ pub struct Refined {
     /// Nodes solved, all rounds; some may be left out of the store.
     pub solved: usize,
     /// Rms error at the configurations by which the filling was stopped, over the rms torque (1).
+    #[serde(skip)]
     pub measured: f64,
     /// Rounds.
     pub rounds: usize,
@@ -90,6 +92,7 @@ pub struct Refined {
     pub lowered: Option<Lowered>,
     /// Notices of the backend, whose nodes are counted from zero in the order in which they were solved, and of thin
     /// parts of the object.
+    #[serde(rename = "warnings")]
     pub notices: Vec<String>,
 }
 
@@ -100,7 +103,7 @@ impl Refine<'_> {
     ///
     /// # Errors
     /// When the base cannot be refined so often, or the backend fails.
-    pub fn fill<B: Backend>(&self, judges: &mut [Judge; 2], backend: &mut B) -> Result<Refined, Error> {
+    pub fn fill<B: Backend>(&self, judges: &mut [Reference; 2], backend: &mut B) -> Result<Refined, Error> {
         let [seen, unseen] = judges;
         let exact = self.model.with_contact(tight(self.model.contact, REFERENCE_TOLERANCE));
         let solvers = Solvers::new(&exact, rayon::current_num_threads());
@@ -113,8 +116,8 @@ impl Refine<'_> {
                 seen.lower(&solvers, &filling.book.nodes);
             }
             let store = filling.store()?;
-            let (mean, deviation) = seen.0.mean_square(|q| store.sample(q).torque());
-            let aim = (self.aim * seen.torque()).powi(2);
+            let (mean, deviation) = seen.mean_square(|q| store.sample(q).torque());
+            let aim = (self.aim * seen.torque).powi(2);
             let refinable = filling.leaves.iter().any(|leaf| leaf.level + 1 < self.levels);
             // A store that errs by nothing has no deviation either.
             let reserve = 1.0 + CONFIDENCE * deviation / mean.max(f64::MIN_POSITIVE);
@@ -122,7 +125,7 @@ impl Refine<'_> {
                 if lowest {
                     unseen.lower(&solvers, &filling.book.nodes);
                 }
-                let mut refined = filling.report(store, mean.sqrt() / seen.torque(), rounds);
+                let mut refined = filling.report(store, mean.sqrt() / seen.torque, rounds);
                 refined.notices.extend(thin_parts::of_store(self.model, &refined.store));
                 return Ok(refined);
             }
@@ -133,7 +136,7 @@ impl Refine<'_> {
     /// Memory that `nodes` nodes take beside their store while it is filled, if contact has forces on so many of the
     /// object's nodes as those of `judge` have (bytes).
     #[must_use]
-    pub fn filling_bytes(&self, nodes: usize, judge: &Judge) -> usize {
+    pub fn filling_bytes(&self, nodes: usize, judge: &Reference) -> usize {
         let numbers = width(self.base.joints()) * (1 + usize::from(self.model.with_slip));
         (nodes as f64 * held_bytes(numbers, judge.mean_forces())).ceil() as usize
     }

@@ -5,7 +5,10 @@ mod motion;
 mod refusals;
 mod scenes;
 
-use haptize::urdf::{Arm, Lock, Robot, UrdfError};
+use haptize::{
+    Error,
+    urdf::{Arm, Lock, Robot},
+};
 use std::path::{Path, PathBuf};
 
 /// A robot file of these tests.
@@ -14,7 +17,7 @@ fn file(name: &str) -> PathBuf {
 }
 
 /// The arm of `text`, read as if it lay among the robots of these tests.
-fn arm(text: &str, tip: &str, locks: &[(&str, f64)]) -> Result<(Robot, Arm), UrdfError> {
+fn arm(text: &str, tip: &str, locks: &[(&str, f64)]) -> Result<(Robot, Arm), Error> {
     let robot = Robot::parse(text.to_owned(), file("robot.urdf"))?;
     let locks: Vec<Lock> = locks.iter().map(|(joint, value)| Lock { joint: (*joint).into(), value: *value }).collect();
     let arm = Arm::new(&robot, tip, &locks)?;

@@ -9,8 +9,8 @@ use haptize::{
     scene::Scene,
     store::record::{slope, width},
     sweep::{
-        Backend, CpuBackend, grid_of,
-        refine::{Judge, Refine, Refined},
+        Backend, CpuBackend, Reference, grid_of,
+        refine::{Refine, Refined},
     },
 };
 use std::{path::Path, time::Instant};
@@ -23,7 +23,7 @@ const RECORD_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
 /// Fills both levels of a store, whole, and prints how fast.
 fn fill<B: Backend>(name: &str, scene: &Scene, model: &Model<'_>, batch: usize, backend: &mut B) -> Refined {
-    let mut judges = [1, 2].map(|seed| Judge::new(scene, model, seed, 50).unwrap());
+    let mut judges = [1, 2].map(|seed| Reference::in_contact(scene, model, seed, 50).unwrap());
     let refine = Refine { model, base: grid_of(scene), levels: 2, aim: f64::MIN_POSITIVE, most: 10_000, batch };
     let start = Instant::now();
     let refined = refine.fill(&mut judges, backend).unwrap();

@@ -2,8 +2,13 @@
 
 use super::block::{STIFFNESS, block, felt, scene, setup};
 use haptize::{
-    JointVector,
-    fixtures::Random,
+    JointMatrix, JointVector,
+    dataset::SlipColumns,
+    fixtures::{
+        Random,
+        worlds::{BUMP_RADIUS, BUMP_STIFFNESS, bump, half_space},
+    },
+    joint_matrix::lower,
     render::{haptic::Inputs, setup::Setup},
     scene::Rendering,
 };
@@ -108,8 +113,98 @@ fn random_ticks_with_memory_give_nothing() {
     }
 }
 
+/// The same over one to six joints, with friction, too, at speeds near those at which the device is taken for faulty.
+#[test]
+fn random_ticks_of_one_to_six_joints_give_nothing() {
+    for joints in 1..=6 {
+        let mut random = Random::new(joints as u64);
+        let mut of = |least: f64, greatest: f64| least * (greatest / least).powf(random.between(0.0, 1.0));
+        let (share, times, mu) = (of(0.1, 0.45), [of(2e-3, 10.0), of(2e-3, 10.0)], of(0.05, 2.0));
+        let mut data = half_space(
+            joints,
+            &format!(
+                "[haptics]\ninterpolation = \"potential\"\n[haptics.friction]\ncoefficient = {mu}\nstiffness = 5.0\n\
+                 [object.relaxation]\nterms = [[{share}, {}], [{share}, {}]]\ndent = 0.1\n",
+                times[0], times[1]
+            ),
+        );
+        let force = |point: usize| data.torque(point).iter().map(|tau| tau * tau).sum::<f64>().sqrt() as f32;
+        let mut unit = JointMatrix::default();
+        (0..joints).for_each(|k| unit[k][k] = 1.0);
+        let points = data.grid.points();
+        data.slip = Some(SlipColumns {
+            normal_force: (0..points).map(force).collect::<Vec<_>>().into(),
+            jacobian: lower(&unit, joints).map(|entry| entry as f32).collect::<Vec<_>>().repeat(points).into(),
+        });
+        let haptics = Setup::new(&data).unwrap().haptics;
+        let mut position = JointVector::zeros(joints);
+        let mut state = haptics.start(&position).unwrap();
+        let (mut before, mut elapsed) = ([0.0; 2], 1e-3);
+        for k in 0..TICKS / 6 {
+            let interval = if k % 7 == 0 { 1e-3 * random.between(0.1, 1.0) } else { 1e-3 };
+            let speed = if k % 500 > 400 { 0.0 } else { 4.0 };
+            for q in position.iter_mut() {
+                *q = (*q + speed * elapsed * random.between(-1.0, 1.0)).clamp(-0.3, 0.5);
+            }
+            let output = haptics.tick(&mut state, &Inputs { position, age: 0.0, elapsed, interval });
+            let now = output.accounts;
+            let rounding = 1e-12 * now.exchanged;
+            assert!(output.fault.is_none() && now.residual().abs() <= rounding, "{joints} joints, {k}: {output:?}");
+            let taken = [now.relaxed, now.friction_dissipation];
+            assert!(
+                (0..2).all(|a| taken[a] >= before[a] - rounding),
+                "{joints} joints, {k}: {taken:?} after {before:?}"
+            );
+            assert!(now.leak <= now.proxy_dissipation + rounding, "{joints} joints, tick {k}: {now:?}");
+            (before, elapsed) = (taken, interval);
+        }
+        assert!(before.iter().all(|taken| *taken > 1e-4), "{joints} joints: {before:?} J");
+    }
+}
+
 /// Random ticks (1): ten times as many were run once.
 const TICKS: usize = 100_000;
+
+/// On a circle in a round bump the torque turns, and the energy stays: nothing is given. Torques that relax joint by joint
+/// are ahead of the finger, `h' + h / theta = g dtau/dt`, and push it along.
+#[test]
+fn a_circle_around_a_bump_gives_nothing() {
+    const RADIUS: f64 = 0.02;
+    const RATE: f64 = std::f64::consts::TAU * 2.0;
+    let terms = [[0.2, 0.05], [0.1, 0.4]];
+    let data = bump(&format!("[haptics]\ninterpolation = \"potential\"\n{STIFF}\n[object.relaxation]\n{TERMS}\n"));
+    let setup = Setup::new(&data).unwrap();
+    let field = setup.haptics.source().field().unwrap();
+    let mut outputs = Vec::new();
+    felt(&setup, 6.0, |t| [RADIUS * (RATE * t).cos(), RADIUS * (RATE * t).sin()], |output| outputs.push(*output));
+    let (mut relaxing, mut given) = ([[0.0; 2]; 2], vec![0.0]);
+    let mut relaxed = field.sample(&outputs[0].proxy).torque;
+    for pair in outputs.windows(2) {
+        let [before, here] = [0, 1].map(|k| (pair[k].proxy, field.sample(&pair[k].proxy).torque));
+        let mut work = 0.0;
+        for joint in 0..2 {
+            let mut torque = 0.7 * here.1[joint];
+            for (h, [share, time]) in relaxing.iter_mut().zip(terms) {
+                h[joint] = (-1e-3_f64 / time).exp() * h[joint] + share * (here.1[joint] - before.1[joint]);
+                torque += h[joint];
+            }
+            work += 0.5 * (relaxed[joint] + torque) * (here.0[joint] - before.0[joint]);
+            relaxed[joint] = torque;
+        }
+        given.push(given[given.len() - 1] + work);
+    }
+    let (last, a_loop) = (outputs.len() - 1, 500);
+    let ahead = terms.iter().map(|[share, time]| share * RATE * time / (1.0 + (RATE * time).powi(2))).sum::<f64>();
+    let force = BUMP_STIFFNESS * (BUMP_RADIUS - RADIUS);
+    let expected = std::f64::consts::TAU * RADIUS * force * ahead;
+    let found = given[last] - given[last - a_loop];
+    assert!((found / expected - 1.0).abs() < 0.03, "{found} J a loop for {expected} J");
+    let own = outputs[last].accounts.field_work - outputs[last - a_loop].accounts.field_work;
+    println!("{own:.1e} J a loop, where torques that relax give {found:.3} J");
+    // The torque of a tick is that at its beginning, half the angle of a tick behind: that takes energy.
+    let behind = -std::f64::consts::TAU * RADIUS * force * 0.7 * 0.5e-3 * RATE;
+    assert!((own / behind - 1.0).abs() < 0.02, "{own} J for {behind} J");
+}
 
 #[test]
 fn relaxation_that_cannot_act_is_refused_with_its_line() {

@@ -130,7 +130,8 @@ fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
         let motion = Motion::through(&way.map(|(time, q)| Waypoint { time, q: vector(&[q]) }), 1).unwrap();
         let mut hand = SimulatedHand::new(&spec, motion).unwrap();
         let mut graphics =
-            Graphics::new(ContactForces::new(&data, object.rest.len()).unwrap(), &object, &graphics_60()).unwrap();
+            Graphics::new(ContactForces::new(&data, object.rest.len()).unwrap(), &object, &graphics_60(), None)
+                .unwrap();
         let plan = Plan { snapshots: vec![0.0, 0.8, 0.8001, 1.45], ..plan(&data, 1.5) };
         session::run(&haptics, &mut hand, Some(&mut graphics), &plan).unwrap()
     };
@@ -139,7 +140,7 @@ fn two_loops_run_at_two_rates_and_repeat_bit_for_bit() {
     assert_eq!(trace.ticks.len(), 1500);
     // Graphics comes again from a recording, too.
     let mut graphics =
-        Graphics::new(ContactForces::new(&data, object.rest.len()).unwrap(), &object, &graphics_60()).unwrap();
+        Graphics::new(ContactForces::new(&data, object.rest.len()).unwrap(), &object, &graphics_60(), None).unwrap();
     let file = tempfile::NamedTempFile::new().unwrap();
     Recording::write(&trace, &mut file.as_file()).unwrap();
     let recording = Recording::read(file.path(), 1).unwrap();

@@ -6,8 +6,8 @@ use haptize::{
     dataset::Dataset,
     store::Store,
     sweep::{
-        CpuBackend, Run, Sweep, grid_of,
-        refine::{Judge, Refine, Refined},
+        CpuBackend, Reference, Run, Sweep, grid_of,
+        refine::{Refine, Refined},
     },
 };
 use std::sync::atomic::AtomicBool;
@@ -24,7 +24,7 @@ impl World {
     /// Both levels of a store, whole, filled on so many threads.
     fn fill_whole(&self, threads: usize, batch: usize) -> Refined {
         let (model, base) = (self.model(), grid_of(&self.scene));
-        let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
+        let mut judges = [1, 2].map(|seed| Reference::in_contact(&self.scene, &model, seed, 100).unwrap());
         let (aim, most) = (f64::MIN_POSITIVE, usize::MAX);
         let refine = Refine { model: &model, base, levels: 2, aim, most, batch };
         let mut backend = CpuBackend::new(&model, threads).unwrap();

@@ -8,8 +8,8 @@ use haptize::{
     dataset::{Axis, Grid},
     store::record::width,
     sweep::{
-        Backend, CpuBackend, WithFallback,
-        refine::{Judge, Refine, Refined},
+        Backend, CpuBackend, Reference, WithFallback,
+        refine::{Refine, Refined},
     },
 };
 
@@ -60,7 +60,7 @@ impl World {
     /// error at configurations that it has not seen.
     fn fill<B: Backend>(&self, (cells, levels, batch): (usize, u32, usize), aim: f64, backend: &mut B) -> Filled {
         let model = self.model();
-        let mut judges = [1, 2].map(|seed| Judge::new(&self.scene, &model, seed, 100).unwrap());
+        let mut judges = [1, 2].map(|seed| Reference::in_contact(&self.scene, &model, seed, 100).unwrap());
         let refine = Refine { model: &model, base: self.base(cells), levels, aim, most: 20_000, batch };
         let refined = refine.fill(&mut judges, backend).unwrap();
         let unseen = judges[1].relative_error(|q| refined.store.sample(q).torque());
@@ -164,7 +164,7 @@ fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
     blocks.for_each(|((key, block), (other_key, other))| assert_eq!((key, block.nodes()), (other_key, other.nodes())));
     let error = {
         let mut device = Breaking(CpuBackend::new(&model, 2).unwrap(), 35);
-        let mut judges = [1, 2].map(|seed| Judge::new(&world.scene, &model, seed, 10).unwrap());
+        let mut judges = [1, 2].map(|seed| Reference::in_contact(&world.scene, &model, seed, 10).unwrap());
         let base = world.base(4);
         let refine = Refine { model: &model, base, levels: 1, aim: 1.0, most: 1000, batch: 10 };
         refine.fill(&mut judges, &mut device).err().unwrap()

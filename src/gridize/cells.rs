@@ -4,48 +4,65 @@
 //! it lasted, and the spread of the means over visits is the repeatability of the measurement: what a second pass
 //! over the same place would give.
 
-use super::mapping::Keep;
-use crate::{Error, JointVector, MAX_AXES, dataset::JointLabel, error, gridize::Samples};
+use super::Samples;
+use crate::{Error, JointVector, MAX_AXES, dataset::JointLabel, error};
 use std::collections::BTreeMap;
 
-/// Cells of C-space that an import averages in: about 1 kB each.
-const IMPORT_CELLS: usize = 1_000_000;
+/// Cells of C-space at most: about 1 kB each.
+const MOST_CELLS: usize = 1_000_000;
 
 /// Cell number on each axis.
 type Key = [i64; MAX_AXES];
 
-/// Direction of motion of the lead joint.
+/// LeadDirection of motion of the lead joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Direction {
+pub enum LeadDirection {
+    /// Up.
     Forward,
+    /// Down.
     Backward,
 }
 
-/// Running mean and sum of squared departures (Welford 1962).
+/// What is made of the two directions in a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Branches {
+    /// The mean of those that were visited.
+    Any,
+    /// The mean of both, in cells visited in both: dry friction cancels.
+    Mean,
+    /// Half of what the torque is greater by on the way down, in cells visited in both: dry friction.
+    HalfDifference,
+    /// One alone.
+    One(LeadDirection),
+}
+
+/// Running weighted mean and sum of squared departures (West 1979).
 #[derive(Clone, Copy)]
 struct Mean {
     count: f64,
+    weight: f64,
     mean: JointVector,
     squares: JointVector,
 }
 
 impl Mean {
     fn new(joints: usize) -> Self {
-        Self { count: 0.0, mean: JointVector::zeros(joints), squares: JointVector::zeros(joints) }
+        Self { count: 0.0, weight: 0.0, mean: JointVector::zeros(joints), squares: JointVector::zeros(joints) }
     }
 
-    fn add(&mut self, values: &JointVector) {
+    fn add(&mut self, values: &JointVector, weight: f64) {
         self.count += 1.0;
+        self.weight += weight;
         for (joint, value) in values.iter().enumerate() {
             let before = value - self.mean[joint];
-            self.mean[joint] += before / self.count;
-            self.squares[joint] += before * (value - self.mean[joint]);
+            self.mean[joint] += weight / self.weight * before;
+            self.squares[joint] += weight * before * (value - self.mean[joint]);
         }
     }
 
     /// Variance of the mean over visits; `None` for a single visit.
     fn variance_of_mean(&self, joint: usize) -> Option<f64> {
-        (self.count > 1.5).then(|| self.squares[joint] / ((self.count - 1.0) * self.count))
+        (self.count > 1.5).then(|| self.squares[joint] / ((self.count - 1.0) * self.weight))
     }
 }
 
@@ -61,13 +78,19 @@ struct Branch {
 /// The run of rows under way.
 struct Visit {
     key: Key,
-    direction: Direction,
+    direction: LeadDirection,
     q: Mean,
     torque: Mean,
 }
 
+impl Branch {
+    fn new(joints: usize) -> Self {
+        Self { q: Mean::new(joints), torque: Mean::new(joints), within: JointVector::zeros(joints) }
+    }
+}
+
 /// Rows sorted into cells.
-pub(super) struct Cells {
+pub struct Cells {
     sides: Vec<f64>,
     joints: usize,
     cells: BTreeMap<Key, [Option<Branch>; 2]>,
@@ -89,29 +112,47 @@ pub struct CellReport {
 }
 
 impl Cells {
+    /// None yet, with these sides, one a joint (rad or m).
+    #[must_use]
     pub fn new(sides: &[f64]) -> Self {
         Self { sides: sides.to_vec(), joints: sides.len(), cells: BTreeMap::new(), visit: None }
     }
 
-    /// Adds a row.
-    pub fn add(&mut self, q: &JointVector, torque: &JointVector, direction: Direction) -> Result<(), Error> {
+    /// The cell of `q`.
+    fn key(&self, q: &JointVector) -> Key {
         let mut key = [0; MAX_AXES];
-        for (k, (x, side)) in key.iter_mut().zip(q.iter().zip(&self.sides)) {
-            *k = (x / side).floor() as i64;
-        }
+        key.iter_mut().zip(q.iter().zip(&self.sides)).for_each(|(k, (x, side))| *k = (x / side).floor() as i64);
+        key
+    }
+
+    /// Adds a row of a visit.
+    ///
+    /// # Errors
+    /// When more cells were visited than are kept.
+    pub fn add(&mut self, q: &JointVector, torque: &JointVector, direction: LeadDirection) -> Result<(), Error> {
+        let key = self.key(q);
         if self.visit.as_ref().is_none_or(|visit| visit.key != key || visit.direction != direction) {
             self.end_visit();
-            if self.cells.len() > IMPORT_CELLS {
-                return Err(error!("more than {IMPORT_CELLS} cells of C-space were visited: enlarge torque.cell"));
+            if self.cells.len() > MOST_CELLS {
+                return Err(error!("more than {MOST_CELLS} cells of C-space were visited: enlarge torque.cell"));
             }
             let empty = Mean::new(self.joints);
             self.visit = Some(Visit { key, direction, q: empty, torque: empty });
         }
         if let Some(visit) = &mut self.visit {
-            visit.q.add(q);
-            visit.torque.add(torque);
+            visit.q.add(q, 1.0);
+            visit.torque.add(torque, 1.0);
         }
         Ok(())
+    }
+
+    /// Adds a row for itself, which counts by its `weight`.
+    pub fn add_alone(&mut self, q: &JointVector, torque: &JointVector, weight: f64) {
+        let (key, joints) = (self.key(q), self.joints);
+        let branch = self.cells.entry(key).or_default()[LeadDirection::Forward as usize]
+            .get_or_insert_with(|| Branch::new(joints));
+        branch.q.add(q, weight);
+        branch.torque.add(torque, weight);
     }
 
     /// The motion was interrupted: what follows is another visit.
@@ -119,36 +160,36 @@ impl Cells {
         let Some(visit) = self.visit.take() else { return };
         let joints = self.joints;
         let branch = &mut self.cells.entry(visit.key).or_default()[visit.direction as usize];
-        let branch = branch.get_or_insert_with(|| Branch {
-            q: Mean::new(joints),
-            torque: Mean::new(joints),
-            within: JointVector::zeros(joints),
-        });
-        branch.q.add(&visit.q.mean);
-        branch.torque.add(&visit.torque.mean);
+        let branch = branch.get_or_insert_with(|| Branch::new(joints));
+        branch.q.add(&visit.q.mean, 1.0);
+        branch.torque.add(&visit.torque.mean, 1.0);
         for (joint, sum) in branch.within.iter_mut().enumerate() {
             *sum += visit.torque.squares[joint] / visit.torque.count;
         }
     }
 
-    /// One sample a cell that has what `keep` asks for.
-    pub fn samples(&self, keep: Keep, joints: &[JointLabel]) -> Samples {
+    /// One sample a cell that has what `branches` asks for.
+    #[must_use]
+    pub fn samples(&self, branches: Branches, joints: &[JointLabel]) -> Samples {
         let mut samples = Samples { joints: joints.to_vec(), ..Samples::default() };
         let mut deviations = Vec::new();
         for [forward, backward] in self.cells.values() {
-            let used: Vec<&Branch> = match keep {
-                Keep::Average if forward.is_none() || backward.is_none() => continue,
-                Keep::Forward => forward.iter().collect(),
-                Keep::Backward => backward.iter().collect(),
+            let is_both = forward.is_some() && backward.is_some();
+            let used: Vec<&Branch> = match branches {
+                Branches::Mean | Branches::HalfDifference if !is_both => continue,
+                Branches::One(LeadDirection::Forward) => forward.iter().collect(),
+                Branches::One(LeadDirection::Backward) => backward.iter().collect(),
                 _ => forward.iter().chain(backward).collect(),
             };
             if used.is_empty() {
                 continue;
             }
             let share = 1.0 / used.len() as f64;
+            let first = if branches == Branches::HalfDifference { -share } else { share };
             for joint in 0..self.joints {
+                let factors = || [first].into_iter().chain(std::iter::repeat(share)).zip(&used);
                 samples.configurations.push(share * used.iter().map(|branch| branch.q.mean[joint]).sum::<f64>());
-                samples.torques.push(share * used.iter().map(|branch| branch.torque.mean[joint]).sum::<f64>());
+                samples.torques.push(factors().map(|(factor, branch)| factor * branch.torque.mean[joint]).sum::<f64>());
                 let single = |branch: &Branch| branch.within[joint] / branch.torque.count;
                 let variance =
                     |branch: &&Branch| branch.torque.variance_of_mean(joint).unwrap_or_else(|| single(branch));
@@ -159,6 +200,8 @@ impl Cells {
         samples
     }
 
+    /// What the cells tell beside.
+    #[must_use]
     pub fn report(&self) -> CellReport {
         let mut report = CellReport {
             cells: self.cells.len(),
