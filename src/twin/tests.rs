@@ -243,27 +243,50 @@ struct Likeness {
     friction: f64,
 }
 
-/// The twin of `specimen` on a ground at `ground`, of true modulus `young` and skin `width`; presses at three `places`,
-/// so `deep` (m).
-fn likeness(specimen: &Specimen, [ground, young, width]: [f64; 3], places: [[f64; 2]; 3], deep: f64) -> Likeness {
-    let Scanned { log, scene, chain, truth, presses } = specimen.scan(2, (&places, deep));
-    let approaches = Approaches::new(&log, &scene, &chain).unwrap();
-    let shape = ScannedShape::new(&approaches, &chain, Some(ground)).unwrap();
+/// Modulus from which the search begins (Pa).
+const START: f64 = 5e3;
+
+/// What `then` makes of the twin of what was scanned, on a ground at `ground` under a skin of `width` (m): of its shape, its
+/// modulus, and contact with it at [`START`].
+fn with_twin<T>(
+    scanned: &Scanned,
+    [ground, width]: [f64; 2],
+    then: impl FnOnce(&ScannedShape, &Modulus, &mut Solver<'_>) -> T,
+) -> T {
+    let Scanned { log, scene, chain, .. } = scanned;
+    let approaches = Approaches::new(log, scene, chain).unwrap();
+    let shape = ScannedShape::new(&approaches, chain, Some(ground)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let [file, path] = ["twin.obj", "twin.toml"].map(|name| folder.path().join(name));
     std::fs::write(&file, shape.obj()).unwrap();
     let mesh = (file.as_path(), "twin.obj");
-    let start = 5e3;
-    let twin = twin_scene((&scene.text, &path), mesh, (&shape, &approaches), start, Some(width)).unwrap();
+    let twin = twin_scene((&scene.text, &path), mesh, (&shape, &approaches), START, Some(width)).unwrap();
     let object = Object::build(&twin.object).unwrap();
-    let mut model = Model::new(&object, &chain, twin.contact);
+    let mut model = Model::new(&object, chain, twin.contact);
     let watched = &mut Watched { stop: &AtomicBool::new(false), progress: &mut |_, _| () };
-    let modulus = Modulus::fit(&mut model, start, (&approaches, &shape), watched).unwrap();
+    let modulus = Modulus::fit(&mut model, START, (&approaches, &shape), watched).unwrap();
+    then(&shape, &modulus, &mut Solver::new(&model))
+}
+
+/// The twin of `specimen` on a ground at `ground`, of true modulus `young` and skin `width`; presses at three `places`,
+/// so `deep` (m).
+fn likeness(specimen: &Specimen, [ground, young, width]: [f64; 3], places: [[f64; 2]; 3], deep: f64) -> Likeness {
+    let scanned = specimen.scan(2, (&places, deep));
+    with_twin(&scanned, [ground, width], |shape, modulus, solver| compare(&scanned, young, shape, modulus, solver))
+}
+
+/// How the twin answers the presses of `scanned`, whose true modulus is `young` (Pa).
+fn compare(
+    Scanned { truth, presses, .. }: &Scanned,
+    young: f64,
+    shape: &ScannedShape,
+    modulus: &Modulus,
+    solver: &mut Solver<'_>,
+) -> Likeness {
     // In rigid contact torque is in proportion to the modulus, and displacement does not depend on it.
-    let ratio = modulus.young / start;
-    let mut solver = Solver::new(&model);
+    let ratio = modulus.young / START;
     let (mut squares, mut count, mut largest, mut worst) = (0.0, 0.0, 0.0_f64, [0.0_f64; 3]);
-    for Press { q, torque, displacement } in &presses {
+    for Press { q, torque, displacement } in presses {
         let own = q.map(|q| solver.solve(&q).torque.iter().map(|tau| ratio * tau).collect::<Vec<f64>>());
         let line: Vec<f64> =
             torque[1].iter().zip(torque[0].iter()).map(|(end, before)| end + 5.0 * (end - before)).collect();
@@ -323,6 +346,40 @@ fn the_twin_of_a_bean_is_as_stiff_and_moves_alike() {
     let found = likeness(&BEAN, [-0.04, 1.5e4, 0.02], [[0.165, 0.002], [0.157, -0.006], [0.173, 0.006]], 0.008);
     println!("bean: {found:?}");
     assert!((found.modulus - 1.0).abs() < 0.1 && found.displacement < 0.12 && found.torque[0] < 0.1);
+}
+
+/// A ball of ten times the slab's stiffness, 3 mm below its top, is seen from outside.
+#[test]
+fn a_nodule_is_seen_in_the_map_of_moduli() {
+    let nodule = Specimen {
+        object: "[object.mesh]
+file = \"slab.obj\"
+scale = 0.001
+centre = [0.16, 0.0, 0.0]
+refine = 0.007
+[object.elasticity]
+young = 8e3
+poisson = 0.45
+cell = 0.01
+inclusion = [{ sphere = { centre = [0.171, 0.002, -0.010], radius = 0.007 }, young = 8e4 }]
+[object.skin]
+width = 0.02
+[object.ground]
+clamp = true
+below = -0.0299",
+        nodes: TIP,
+        ..SLAB
+    };
+    let scanned = nodule.scan(4, (&[], 0.0));
+    with_twin(&scanned, [-0.03, 0.02], |shape, modulus, _| {
+        let apparent = |touched: &super::Touched| modulus.apparent.get(&touched.line).copied();
+        let known = shape.touched.iter().filter_map(|touched| Some((touched.place, apparent(touched)?)));
+        let stiffest = known.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        let (off, contrast) =
+            ((stiffest.0 - DVec3::new(0.171, 0.002, stiffest.0.z)).length(), stiffest.1 / modulus.young);
+        println!("nodule: {:.1} mm off, contrast {contrast:.2}, spacing {:.1} mm", 1e3 * off, 1e3 * shape.spacing);
+        assert!(off < shape.spacing && contrast > 1.03, "{off} {contrast}");
+    });
 }
 
 #[test]
