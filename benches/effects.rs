@@ -197,7 +197,8 @@ impl Body {
         let body = |(setup, dataset): (&Setup, &Dataset)| {
             let (Some(object), Some(graphics)) = (&setup.object, &setup.scene.graphics) else { return Ok(None) };
             let relaxation = setup.scene.haptics.relaxation.as_ref();
-            let (nodes, period, method) = (object.rest.len(), 1.0 / graphics.rate, FrameMethod::suitable(object));
+            let (nodes, period, method) =
+                (object.rest.len(), 1.0 / graphics.rate, FrameMethod::suitable(object.mechanics()?));
             Ok(Some(Self {
                 contact: ContactForces::new(dataset, nodes).unwrap(),
                 forces: DrawnForces::new(nodes, graphics, relaxation),

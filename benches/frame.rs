@@ -63,16 +63,18 @@ fn coordinates(of: impl Fn(usize) -> f64) -> DVec3 {
 fn solves(object: &Object, is_isotropic: bool) -> [f64; 3] {
     let (nodes, rows) = (object.rest.len(), if is_isotropic { 1 } else { 3 });
     let entries = (0..nodes).flat_map(|node| {
-        object.stiffness.row(node).filter(move |(other, _)| *other >= node).flat_map(move |(other, block)| {
-            let at = (0..rows * rows).map(|k| (k / rows, k % rows));
-            at.map(move |(a, b)| Triplet::new(rows * other + a, rows * node + b, block.row(b)[a]))
-                .filter(|entry| entry.row >= entry.col)
-                .collect::<Vec<_>>()
-        })
+        object.mechanics().unwrap().stiffness.row(node).filter(move |(other, _)| *other >= node).flat_map(
+            move |(other, block)| {
+                let at = (0..rows * rows).map(|k| (k / rows, k % rows));
+                at.map(move |(a, b)| Triplet::new(rows * other + a, rows * node + b, block.row(b)[a]))
+                    .filter(|entry| entry.row >= entry.col)
+                    .collect::<Vec<_>>()
+            },
+        )
     });
     let matrix = SparseColMat::try_new_from_triplets(rows * nodes, rows * nodes, &entries.collect::<Vec<_>>()).unwrap();
     let of_node = |&node: &u32| (0..rows).map(move |a| rows * node as usize + a);
-    let order: Vec<usize> = object.stiffness.ordering.iter().flat_map(of_node).collect();
+    let order: Vec<usize> = object.mechanics().unwrap().stiffness.ordering.iter().flat_map(of_node).collect();
     let mut rank = vec![0; order.len()];
     order.iter().enumerate().for_each(|(k, &row)| rank[row] = k);
     let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&order, &rank, order.len()));
@@ -97,8 +99,8 @@ fn solves(object: &Object, is_isotropic: bool) -> [f64; 3] {
         let mut vectors: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
         let right = Mat::from_fn(rows * nodes, 3 / rows, |row, column| vectors[row / rows][row % rows + column]);
         let mut again = vectors.clone();
-        least[0] = least[0].min(timed(|| object.factor.solve(&mut vectors)).0);
-        least[1] = least[1].min(alone.install(|| timed(|| object.factor.solve(&mut again)).0));
+        least[0] = least[0].min(timed(|| object.mechanics().unwrap().factor.solve(&mut vectors)).0);
+        least[1] = least[1].min(alone.install(|| timed(|| object.mechanics().unwrap().factor.solve(&mut again)).0));
         let mut solved = right.clone();
         let mut scratch = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(solved.ncols(), Par::Seq));
         let solve = || {
@@ -156,7 +158,7 @@ fn main() {
                 if kind == SpringKind::Isotropic {
                     isotropic[number] = frame;
                 }
-                let (kind, megabytes) = (format!("{kind:?}"), object.factor.bytes() as f64 * 1e-6);
+                let (kind, megabytes) = (format!("{kind:?}"), object.mechanics().unwrap().factor.bytes() as f64 * 1e-6);
                 let ratio = frame / isotropic[number];
                 println!(
                     "{nodes:7}  {kind:9}  {name:12}  {built:9.2}  {set_up:10.2}  {megabytes:11.1}  {frame:12.2}, \

@@ -110,6 +110,7 @@ pub mod viewer;
 
 pub mod cli;
 
+mod cache;
 mod csv;
 mod error;
 mod input;

@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let inspected = Inspected {
         interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
         stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
-        lattice: object.lattice_error(&scene.object, &model.compliance),
+        lattice: object.lattice_error(&model.compliance),
         solved,
         warnings,
         body: Body { inclusions: info::inclusions(&scene.object), skin: object.skin },

@@ -64,6 +64,7 @@ mod watch;
 
 use self::report::Report;
 use crate::{
+    cache::Cache,
     names,
     render::trace::Tick,
     sweep::{OTHER_ADAPTER, remedied},
@@ -98,6 +99,9 @@ struct CommandLine {
     /// Replace files that haptize did not write, too.
     #[arg(long, global = true)]
     force: bool,
+    /// Neither use nor keep what earlier commands computed of the same body.
+    #[arg(long, global = true)]
+    no_cache: bool,
 }
 
 #[derive(Subcommand)]
@@ -206,6 +210,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     if line.force {
         output::force();
+    }
+    if !line.no_cache {
+        Cache::of_user(|note| tell(format_args!("haptize: note: {note}"))).into_iter().for_each(Cache::begin);
     }
     crash::let_go_first();
     // What refines a grid keeps nothing before its end.

@@ -60,7 +60,7 @@ impl<'a> Model<'a> {
     /// Prepares `object` and `chain` for contact as `contact` says, wherever it may be.
     #[must_use]
     pub fn new(object: &'a Object, chain: &'a Chain, contact: ContactSpec) -> Self {
-        Self::with_compliance(object, chain, contact, Compliance::new(object))
+        Self::with_compliance(object, chain, contact, Compliance::new(object).into())
     }
 
     /// Surface nodes up to which all of the compliance is formed: at most 0.3 GB, in some seconds.
@@ -70,7 +70,7 @@ impl<'a> Model<'a> {
         object: &'a Object,
         chain: &'a Chain,
         contact: ContactSpec,
-        compliance: Compliance,
+        compliance: Arc<Compliance>,
     ) -> Self {
         let mut model = Self {
             object,
@@ -79,7 +79,7 @@ impl<'a> Model<'a> {
             mobility: 0.0,
             bulge_mobility: 0.0,
             covered_leaves: Arc::default(),
-            compliance: Arc::new(compliance),
+            compliance,
             contact,
             kc: 0.0,
             shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
@@ -92,8 +92,8 @@ impl<'a> Model<'a> {
     }
 
     /// Takes `compliance` instead of what there is, with all that follows from it.
-    pub fn take_compliance(&mut self, compliance: Compliance) {
-        self.compliance = Arc::new(compliance);
+    pub fn take_compliance(&mut self, compliance: Arc<Compliance>) {
+        self.compliance = compliance;
         self.measure_compliance();
     }
 

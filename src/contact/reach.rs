@@ -26,8 +26,8 @@ const SHARE: usize = 256;
 
 impl<'a> Model<'a> {
     /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes,
-    /// only the compliance of those within the proxy's reach is formed. A configuration that reaches farther is flagged
-    /// [`super::Status::Overflow`].
+    /// only the compliance of those within the proxy's reach is formed, and none where there is no configuration. One
+    /// that reaches farther is flagged [`super::Status::Overflow`].
     ///
     /// # Errors
     /// When the compliance would not fit in memory.
@@ -37,8 +37,9 @@ impl<'a> Model<'a> {
         contact: ContactSpec,
         configurations: &[JointVector],
     ) -> Result<Self, Error> {
-        if object.surface_nodes <= Self::WHOLE {
-            return Ok(Self::new(object, chain, contact));
+        if object.surface_nodes <= Self::WHOLE && !configurations.is_empty() {
+            let whole = Compliance::on(object, (0..object.surface_nodes as u32).collect())?;
+            return Ok(Self::with_compliance(object, chain, contact, whole));
         }
         let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
         let nodes = reached(&model, configurations);

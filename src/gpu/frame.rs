@@ -14,7 +14,7 @@ use super::{
     buffer::StorageBuffer, context::Context, dispatch::Dispatch, error::GpuError, kernel::Kernel,
     layout::FrameParameters, shaders,
 };
-use crate::object::{Attachment, Compliance, Factor, Object, Stiffening, Stiffness, settled};
+use crate::object::{Attachment, Compliance, Factor, Mechanics, Object, Stiffening, Stiffness, settled};
 use crate::scene::GraphicsEffects;
 use crate::{Error, error, memory};
 use glam::DVec3;
@@ -44,10 +44,11 @@ impl FrameMethod {
     /// Enough iterations for objects whose springs reach a few dozen edges in one period.
     pub const USUAL_ITERATIONS: u32 = 32;
 
-    /// Chooses the method for `object`.
+    /// Chooses the method for an object.
     #[must_use]
-    pub fn suitable(object: &Object) -> Self {
-        let order = if object.stiffness.is_isotropic() { object.moved.len() } else { 3 * object.moved.len() };
+    pub fn suitable(mechanics: &Mechanics) -> Self {
+        let Mechanics { stiffness, moved, .. } = mechanics;
+        let order = if stiffness.is_isotropic() { moved.len() } else { 3 * moved.len() };
         if order.saturating_pow(2) <= Self::MOST_BYTES_INVERTED / size_of::<f32>() {
             Self::Inverse
         } else {
@@ -153,13 +154,15 @@ impl FrameUpdate {
         if !(period > 0.0 && period.is_finite()) {
             return Err(error!("the time between frames is {period} s; it must be a positive number"));
         }
-        let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
+        let mechanics = object.mechanics()?;
+        let stiffening = effects.stiffening.map(|spec| Stiffening::new(mechanics, spec.factor, spec.strain));
         let weight: Vec<DVec3> =
-            effects.gravity.map_or_else(Vec::new, |g| object.mass.iter().map(|m| *m * g).collect());
-        let start = start(object, &weight, stiffening.as_ref(), effects)?;
-        let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
+            effects.gravity.map_or_else(Vec::new, |g| mechanics.mass.iter().map(|m| *m * g).collect());
+        let start = start(mechanics, &weight, stiffening.as_ref(), effects)?;
+        let stiffness = stiffening.as_ref().map_or(&mechanics.stiffness, Stiffening::bound);
         let gpu = context.as_ref();
-        let common = Common::new(gpu, object, stiffness, (period, effects), &start, !weight.is_empty() || remembers)?;
+        let common =
+            Common::new(gpu, mechanics, stiffness, (period, effects), &start, !weight.is_empty() || remembers)?;
         let mut stages = Vec::new();
         let mut buffers = common.sizes();
         if let (Some(stiffening), Some(loads), Some(spec)) = (&stiffening, &common.loads, effects.stiffening) {
@@ -171,7 +174,7 @@ impl FrameUpdate {
         let mut overrides = if effects.quasi_static { vec![("QUASI_STATIC", 1.0)] } else { Vec::new() };
         match method {
             FrameMethod::Inverse => {
-                let (inverse, is_isotropic) = inverse(object, stiffness, period, effects)?;
+                let (inverse, is_isotropic) = inverse(mechanics, stiffness, period, effects)?;
                 if is_isotropic {
                     overrides.push(("ISOTROPIC", 1.0));
                 }
@@ -193,7 +196,7 @@ impl FrameUpdate {
                 stages.extend(common.iterative_stages(gpu, &odd, [&work, &sums], iterations, &overrides)?);
             }
         }
-        let attachment = object.attachment.clone();
+        let attachment = mechanics.attachment.clone();
         let followers = if attachment.is_identity() {
             None
         } else {
@@ -202,7 +205,7 @@ impl FrameUpdate {
             Some(followers)
         };
         let takes = FrameCost::of(&buffers, &stages);
-        let (acting, padded) = (vec![DVec3::ZERO; object.moved.len()], Vec::new());
+        let (acting, padded) = (vec![DVec3::ZERO; mechanics.moved.len()], Vec::new());
         let Common { state, forces, loads, .. } = common;
         Ok(Self { state, attachment, followers, forces, loads, weight, acting, padded, stages, takes, context })
     }
@@ -319,15 +322,15 @@ fn following_stage(
 /// State at the start: displacements under the nodes' `weight` (m), then velocities where there are any; four numbers a
 /// node.
 fn start(
-    object: &Object,
+    mechanics: &Mechanics,
     weight: &[DVec3],
     stiffening: Option<&Stiffening>,
     effects: &GraphicsEffects,
 ) -> Result<Vec<[f32; 4]>, Error> {
-    let nodes = object.moved.len();
+    let nodes = mechanics.moved.len();
     let mut start = vec![[0.0; 4]; if effects.quasi_static { nodes } else { 2 * nodes }];
     if !weight.is_empty() {
-        for (start, u) in start.iter_mut().zip(settled(object, weight, stiffening)?) {
+        for (start, u) in start.iter_mut().zip(settled(mechanics, weight, stiffening)?) {
             *start = u.as_vec3().extend(0.0).to_array();
         }
     }
@@ -338,13 +341,13 @@ fn start(
 /// the three coordinates are alike, as the flag says, else 3 x 3. An inverse that would not fit in memory is an
 /// error before it is begun.
 fn inverse(
-    object: &Object,
+    mechanics: &Mechanics,
     stiffness: &Stiffness,
     period: f64,
     effects: &GraphicsEffects,
 ) -> Result<(Vec<f32>, bool), Error> {
-    let nodes = object.moved.len();
-    let inertia = object.mass.iter().zip(&object.damping);
+    let nodes = mechanics.moved.len();
+    let inertia = mechanics.mass.iter().zip(&mechanics.damping);
     let mut diagonal: Vec<f64> = inertia.map(|(mass, damping)| 2.0 * mass / period + damping).collect();
     if effects.quasi_static {
         diagonal.fill(0.0);
@@ -386,21 +389,25 @@ impl Common {
     /// The update of an object of matrix `stiffness`, from the state `start`; `is_heavy` where nodes have a weight.
     fn new(
         gpu: &Context,
-        object: &Object,
+        mechanics: &Mechanics,
         stiffness: &Stiffness,
         (period, effects): (f64, &GraphicsEffects),
         start: &[[f32; 4]],
         is_heavy: bool,
     ) -> Result<Self, GpuError> {
-        let nodes = object.moved.len();
-        let zero = vec![[0.0f32; 4]; nodes.max(object.rest.len())];
-        let has_loads = is_heavy || effects.stiffening.is_some() || !object.attachment.is_identity();
+        let nodes = mechanics.moved.len();
+        let zero = vec![[0.0f32; 4]; nodes.max(mechanics.attachment.rows())];
+        let has_loads = is_heavy || effects.stiffening.is_some() || !mechanics.attachment.is_identity();
         let mut structure: Vec<u32> = stiffness.offsets.iter().map(|&offset| offset as u32).collect();
         structure.extend(&stiffness.columns);
         let blocks: Vec<f32> =
             stiffness.blocks.iter().flat_map(|block| block.to_cols_array()).map(|entry| entry as f32).collect();
-        let inertia: Vec<[f32; 2]> =
-            object.mass.iter().zip(&object.damping).map(|(&mass, &damping)| [mass as f32, damping as f32]).collect();
+        let inertia: Vec<[f32; 2]> = mechanics
+            .mass
+            .iter()
+            .zip(&mechanics.damping)
+            .map(|(&mass, &damping)| [mass as f32, damping as f32])
+            .collect();
         let groups = (nodes as u32).div_ceil(WORKGROUP);
         let parameters = FrameParameters { nodes: nodes as u32, period: period as f32, odd: 0, groups };
         Ok(Self {
@@ -411,7 +418,7 @@ impl Common {
             inertia: (!effects.quasi_static)
                 .then(|| StorageBuffer::from_slice(gpu, "masses and damping", &inertia))
                 .transpose()?,
-            forces: StorageBuffer::from_slice(gpu, "frame forces", &zero[..object.rest.len()])?,
+            forces: StorageBuffer::from_slice(gpu, "frame forces", &zero[..mechanics.attachment.rows()])?,
             loads: has_loads.then(|| StorageBuffer::from_slice(gpu, "frame loads", &zero[..nodes])).transpose()?,
             state: StorageBuffer::from_slice(gpu, "frame state", start)?,
         })

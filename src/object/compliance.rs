@@ -7,9 +7,10 @@
 //! Where springs and ground are isotropic C = c (x) I: a force moves every node along itself, and one number a pair of
 //! nodes is all there is to store and to multiply with, instead of nine.
 
-use super::{Attachment, Factor, Object};
-use crate::{Error, error, memory};
+use super::{Attachment, Factor, Mechanics, Object};
+use crate::{Error, cache::Cache, error, memory};
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 
 /// Dense symmetric matrix over R covered surface nodes (m/N).
 #[derive(Clone, Debug, PartialEq)]
@@ -33,20 +34,43 @@ const ABSENT: u32 = u32::MAX;
 const MAX_BYTES: usize = 4 << 30;
 
 impl Compliance {
-    /// The compliance on all surface nodes of `object`.
+    /// The compliance on all surface nodes of `object`; on none if it has no mechanics yet, and there is no memory for
+    /// them.
     #[must_use]
     pub fn new(object: &Object) -> Self {
-        let nodes = (0..object.surface_nodes as u32).collect();
-        Self::of(&object.factor, &object.attachment, object.surface_nodes, nodes)
+        let formed = object.mechanics().map(|mechanics| (mechanics, (0..object.surface_nodes as u32).collect()));
+        let on = |(mechanics, nodes): (&Mechanics, Vec<u32>)| {
+            Self::of(&mechanics.factor, &mechanics.attachment, object.surface_nodes, nodes)
+        };
+        formed.map_or_else(|_| Self::from_parts(Vec::new(), object.surface_nodes, 3, Vec::new()), on)
     }
 
-    /// The compliance on some surface nodes of `object`, ascending and each once.
+    /// The compliance on some surface nodes of `object`, ascending and each once: what an earlier run has kept, or
+    /// formed, and kept for later ones.
     ///
     /// # Errors
     /// When it would not fit in memory; nothing has been allocated then.
-    pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Self, Error> {
+    pub fn on(object: &Object, nodes: Vec<u32>) -> Result<Arc<Self>, Error> {
+        if nodes.is_empty() {
+            return Ok(Arc::new(Self::from_parts(nodes, object.surface_nodes, 3, Vec::new())));
+        }
         Self::check(object, nodes.len())?;
-        Ok(Self::of(&object.factor, &object.attachment, object.surface_nodes, nodes))
+        let key = [&object.key[..], b"compliance", bytemuck::cast_slice(&nodes)].concat();
+        let kept = Cache::used().and_then(|cache| cache.find(&key));
+        if let (Some(entries), Some(rows_per_node)) = (kept, object.proven) {
+            let entries = bytemuck::pod_collect_to_vec(&entries);
+            return Ok(Arc::new(Self::from_parts(nodes, object.surface_nodes, rows_per_node, entries)));
+        }
+        let mechanics = object.mechanics()?;
+        let formed = Self::of(&mechanics.factor, &mechanics.attachment, object.surface_nodes, nodes);
+        Cache::used().into_iter().for_each(|cache| cache.keep(&key, bytemuck::cast_slice(&formed.entries)));
+        Ok(Arc::new(formed))
+    }
+
+    fn from_parts(nodes: Vec<u32>, surface_nodes: usize, rows_per_node: usize, entries: Vec<f64>) -> Self {
+        let mut places = vec![ABSENT; surface_nodes];
+        nodes.iter().zip(0..).for_each(|(&node, place)| places[node as usize] = place);
+        Self { nodes, places, rows_per_node, entries }
     }
 
     /// Checks that the compliance on `nodes` surface nodes of `object` would fit in memory.
@@ -54,7 +78,9 @@ impl Compliance {
     /// # Errors
     /// When it would not.
     pub fn check(object: &Object, nodes: usize) -> Result<(), Error> {
-        let order = nodes.saturating_mul(object.factor.rows_per_node());
+        let rows_per_node =
+            object.proven.map_or_else(|| Ok(object.mechanics()?.factor.rows_per_node()), Ok::<_, Error>)?;
+        let order = nodes.saturating_mul(rows_per_node);
         let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
         if bytes <= memory::SMALL {
             return Ok(());
@@ -80,8 +106,6 @@ impl Compliance {
     /// The part of N K^-1 N^T at `covered` ones of the first `surface_nodes` nodes; N is `attachment`.
     fn of(factor: &Factor, attachment: &Attachment, surface_nodes: usize, covered: Vec<u32>) -> Self {
         let rows_per_node = factor.rows_per_node();
-        let mut places = vec![ABSENT; surface_nodes];
-        covered.iter().zip(0..).for_each(|(&node, place)| places[node as usize] = place);
         // Rows of N, one for each coordinate of a node.
         let row = |k: usize| {
             let nodes = attachment.row(covered[k / rows_per_node] as usize).iter();
@@ -89,7 +113,7 @@ impl Compliance {
         };
         let rows: Vec<Vec<(usize, f64)>> = (0..rows_per_node * covered.len()).map(row).collect();
         let entries = factor.condensed(&rows);
-        Self { nodes: covered, places, rows_per_node, entries }
+        Self::from_parts(covered, surface_nodes, rows_per_node, entries)
     }
 
     /// Whether all surface nodes are covered.

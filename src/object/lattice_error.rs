@@ -6,8 +6,9 @@
 //! have in energy under a pressure whose edge their nodes do not follow. Coarser cubes take a tenth of the work of
 //! those in question; finer ones would take some thirty times as much.
 
-use super::{Compliance, Object, lattice, topology};
+use super::{Compliance, Mechanics, Object, lattice, topology};
 use crate::scene::{ElasticSpec, Material, ObjectSpec};
+use crate::{Error, cache::Cache};
 use glam::DVec3;
 use serde::Serialize;
 use std::fmt;
@@ -58,24 +59,38 @@ impl fmt::Display for LatticeError {
 }
 
 impl Object {
-    /// Estimates by how much the lattice in this object, built of `spec`, errs under a pressure around a typical node
+    /// Estimates by how much the lattice in this object errs under a pressure around a typical node
     /// of `compliance`, that of median softness: on corners errors are greater, and contact is rare. None if no lattice
     /// fills it, or if the coarser one is refused, as where it misses an inclusion.
     #[must_use]
-    pub fn lattice_error(&self, spec: &ObjectSpec, compliance: &Compliance) -> Option<LatticeError> {
-        let Material::Elastic(elastic) = &spec.material else { return None };
+    pub fn lattice_error(&self, compliance: &Compliance) -> Option<LatticeError> {
+        let Material::Elastic(elastic) = &self.spec.material else { return None };
         let trace = |i: usize| (0..3).map(|k| compliance.block(i, i).col(k)[k]).sum::<f64>();
         let mut places: Vec<usize> = (0..compliance.nodes.len()).collect();
         places.sort_by(|&i, &j| trace(i).total_cmp(&trace(j)));
         let typical = *places.get(places.len() / 2).filter(|_| self.tetrahedra.is_empty())?;
         let edge = topology::mean_edge(&self.rest, &self.triangles);
         let cell = elastic.cell.unwrap_or_else(|| lattice::suitable_size(&self.rest, edge));
-        let material = Material::Elastic(ElasticSpec { cell: Some(COARSER * cell), ..elastic.clone() });
-        let coarser = ObjectSpec { material, ..spec.clone() };
-        let coarser = Self::from_surface(&coarser, self.rest.clone(), self.triangles.clone()).ok()?;
-        let forces = self.pressure(compliance.nodes[typical] as usize, RADIUS * edge);
-        let relative = INDEX * (coarser.work(&forces) / self.work(&forces) - 1.0).abs();
+        let node = compliance.nodes[typical];
+        let key = [&self.key[..], b"error of the lattice", &node.to_le_bytes()].concat();
+        let kept = Cache::used().and_then(|cache| cache.find(&key));
+        let kept = kept.and_then(|bytes| Some(f64::from_le_bytes(bytes.try_into().ok()?)));
+        let relative = kept.or_else(|| {
+            let relative =
+                self.relative_error(elastic, COARSER * cell, &self.pressure(node as usize, RADIUS * edge))?;
+            Cache::used().into_iter().for_each(|cache| cache.keep(&key, &relative.to_le_bytes()));
+            Some(relative)
+        })?;
         Some(LatticeError { cell, relative })
+    }
+
+    /// The same from the work of `forces` on cubes of the size `coarser` (m), relative to the compliance (1).
+    fn relative_error(&self, elastic: &ElasticSpec, coarser: f64, forces: &[DVec3]) -> Option<f64> {
+        let material = Material::Elastic(ElasticSpec { cell: Some(coarser), ..elastic.clone() });
+        let coarser = ObjectSpec { material, ..self.spec.clone() };
+        let coarser = Self::from_surface(&coarser, self.rest.clone(), self.triangles.clone()).ok()?;
+        let [coarser, own] = [&coarser, self].map(|object| object.work(forces).ok());
+        Some(INDEX * (coarser? / own? - 1.0).abs())
     }
 
     /// Forces on the surface's nodes of the pressure `(1 - r^2/a^2)^2` around `node`, `a` being `radius` (m).
@@ -93,10 +108,11 @@ impl Object {
     }
 
     /// Work of `forces` on the surface's nodes along the displacement that they cause.
-    fn work(&self, forces: &[DVec3]) -> f64 {
-        let mut moved = vec![DVec3::ZERO; self.moved.len()];
-        self.attachment.spread(forces, &mut moved);
-        self.factor.solve(&mut moved);
-        forces.iter().enumerate().map(|(node, force)| force.dot(self.attachment.follow(node, &moved))).sum()
+    fn work(&self, forces: &[DVec3]) -> Result<f64, Error> {
+        let Mechanics { attachment, factor, moved, .. } = self.mechanics()?;
+        let mut u = vec![DVec3::ZERO; moved.len()];
+        attachment.spread(forces, &mut u);
+        factor.solve(&mut u);
+        Ok(forces.iter().enumerate().map(|(node, force)| force.dot(attachment.follow(node, &u))).sum())
     }
 }

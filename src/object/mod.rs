@@ -19,6 +19,7 @@ mod import;
 mod inclusion;
 mod lattice;
 mod lattice_error;
+mod mechanics;
 mod mesh_summary;
 mod ordering;
 mod refine;
@@ -41,6 +42,7 @@ pub use factor::Factor;
 pub(crate) use icosphere::generate as icosphere;
 pub(crate) use import::{MOST_METRES, corners, length, read as read_surface};
 pub use lattice_error::LatticeError;
+pub use mechanics::Mechanics;
 pub use mesh_summary::MeshSummary;
 pub use settled::settled;
 pub use skin::Skin;
@@ -49,22 +51,18 @@ pub use stiffness::Stiffness;
 pub use topology::Topology;
 
 use crate::{
-    Error, error, memory,
+    Error,
+    cache::Cache,
+    error, memory,
     scene::{ElasticSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape},
 };
 use glam::DVec3;
-use ground::Held;
-use inclusion::Materials;
-use lattice::Lattice;
-use skin::Laplacian;
-use solid::Elements;
-use tetrahedra::Tetrahedra;
+use std::sync::{Arc, OnceLock};
 
 /// A deformable object at rest.
 ///
 /// Nodes `0..surface_nodes` lie on the surface and are the only ones that triangles name; interior nodes of a mesh of
-/// tetrahedra follow. K moves nodes of its own, those of the finite elements of an elastic solid, which the object's
-/// nodes follow by [`Attachment`]; on springs and skins the two are the same.
+/// tetrahedra follow.
 #[derive(Clone, Debug)]
 pub struct Object {
     /// Rest positions n0 of all nodes (m).
@@ -83,20 +81,16 @@ pub struct Object {
     pub topology: Topology,
     /// The skin of the surface, where it has one.
     pub skin: Option<Skin>,
-    /// Rest positions of the nodes of K (m).
-    pub moved: Vec<DVec3>,
-    /// N: how the object's nodes follow those of K.
-    pub attachment: Attachment,
-    /// K = Kn + Kg over its nodes, the skin's included (N/m).
-    pub stiffness: Stiffness,
-    /// Cholesky factor of K.
-    pub factor: Factor,
-    /// Mass of each node of K (kg).
-    pub mass: Vec<f64>,
-    /// Damping of each node of K against the ground (N s/m).
-    pub damping: Vec<f64>,
     /// Repairs made on the way, one sentence each, for the user to read.
     pub warnings: Vec<String>,
+    /// What it was built of.
+    spec: ObjectSpec,
+    /// See [`Object::key`].
+    key: Arc<[u8]>,
+    /// Rows of K per node, where an earlier run has found that it is positive definite.
+    proven: Option<usize>,
+    /// See [`Object::mechanics`].
+    mechanics: OnceLock<Arc<Mechanics>>,
 }
 
 /// Nodes (m) and triangles of a surface.
@@ -173,96 +167,67 @@ impl Object {
         let surface = topology::close(&body.nodes[..body.surface_nodes], &mut body.triangles)
             .map_err(|defect| refused(spec, &defect))?;
         warnings.extend(surface.warnings);
-        let shell = &body.nodes[..body.surface_nodes];
-        let edge = topology::mean_edge(shell, &body.triangles);
-        let mut points = Vec::new();
-        let elements: Option<Box<dyn Elements>> = match &spec.material {
-            Material::Elastic(elastic) if body.tetrahedra.is_empty() => {
-                let cell = elastic.cell.unwrap_or_else(|| lattice::suitable_size(shell, edge));
-                let lattice = Lattice::around(shell, cell)?;
-                points = attachment::surface_points(shell, &body.triangles, lattice::POINT_SPACING * cell);
-                Some(Box::new(lattice.fill(shell, &body.triangles, &points)))
-            }
-            Material::Elastic(_) => Some(Box::new(Tetrahedra::new(&body))),
-            _ => None,
-        };
-        let is_solid = !body.tetrahedra.is_empty() || elements.is_some();
-        let elements = elements.as_deref();
-        if points.is_empty() {
-            points = attachment::surface_points(shell, &body.triangles, f64::INFINITY);
-        }
-        let (moved, attachment) = match elements {
-            Some(elements) => {
-                let moved = elements.positions().to_vec();
-                check_count(moved.len())?;
-                let rows = [body.surface_nodes, body.nodes.len() - body.surface_nodes, moved.len()];
-                let attachment = Attachment::averaged(&points, rows, |point| {
-                    let (element, values) = elements.locate(point);
-                    (elements.nodes(element), values)
-                });
-                (moved, attachment)
-            }
-            None => (body.nodes.clone(), Attachment::identity(body.nodes.len())),
-        };
-        let edges = match &spec.material {
-            Material::Springs(_) => springs::edges(&body, surface.edges)?,
-            Material::Elastic(_) | Material::Hollow => Vec::new(),
-        };
-        let laplacian = spec.skin.map(|skin| (skin, Laplacian::new(shell, &body.triangles)));
-        let grounded = spec.ground.as_ref().map(|ground| ground::select(ground, &body.nodes)).transpose()?;
-        let mut cliques: Vec<Vec<u32>> = edges.iter().map(|ends| ends.to_vec()).collect();
-        cliques.extend(elements.into_iter().flat_map(|e| (0..e.count()).map(|element| e.nodes(element).to_vec())));
-        cliques.extend(laplacian.iter().flat_map(|(skin, laplacian)| laplacian.cliques(*skin, &attachment)));
-        if spec.ground.as_ref().is_some_and(|ground| matches!(ground.stiffness, GroundStiffness::PerNode(_))) {
-            let held = grounded.iter().flatten().enumerate().filter(|(_, held)| **held);
-            cliques.extend(held.map(|(node, _)| attachment.row(node).iter().map(|(column, _)| *column).collect()));
-        }
-        let mut stiffness = Stiffness::with_pattern(moved.len(), &cliques);
-        drop(cliques);
-        stiffness.ordering = ordering::nested_dissection(&stiffness, &moved);
+        let is_solid = !body.tetrahedra.is_empty() || matches!(spec.material, Material::Elastic(_));
         let held_everywhere = spec.skin.is_some_and(|skin| skin.foundation > 0.0);
         if !is_solid && !held_everywhere {
+            let grounded = spec.ground.as_ref().map(|ground| ground::select(ground, &body.nodes)).transpose()?;
             ground::check_components(&surface.components, grounded.as_deref().unwrap_or_default())?;
         }
-        let mut share = vec![1.0 / moved.len() as f64; moved.len()];
-        match (&spec.material, elements) {
-            (Material::Springs(springs), _) => springs::add(spec, *springs, &moved, &edges, &mut stiffness)?,
-            (Material::Elastic(elastic), Some(elements)) => {
-                share = solid::add(elements, &Materials::new(elastic), &mut stiffness)?;
-            }
-            _ => {}
-        }
-        let young = match &spec.material {
-            Material::Elastic(elastic) => elastic.young,
-            _ => 0.0,
-        };
-        let held =
-            Held { points: &points, attachment: &attachment, solid: elements.map(|elements| (elements, young)), edge };
-        for (ground, grounded) in spec.ground.iter().zip(&grounded) {
-            held.add(ground, grounded, &mut stiffness);
-        }
-        laplacian.iter().for_each(|(skin, laplacian)| laplacian.add(*skin, &attachment, &mut stiffness));
-        let factor = factor::prove_positive_definite(&stiffness)?;
-        let total = body.nodes.len() as f64;
+        let key: Arc<[u8]> = key(spec, &body).into();
         let Body { nodes, surface_nodes, triangles, tetrahedra, mid_nodes, regions } = body;
-        Ok(Self {
-            surface_nodes,
+        let object = Self {
+            proven: Cache::used().and_then(|cache| cache.find(&key)?.first().map(|rows| usize::from(*rows))),
             skin: spec.skin.map(|skin| Skin::new(skin, &nodes[..surface_nodes], &triangles)),
-            mass: share.iter().map(|share| spec.node_mass * total * share).collect(),
-            damping: share.iter().map(|share| spec.node_damping * total * share).collect(),
             rest: nodes,
+            surface_nodes,
             triangles,
             tetrahedra,
             mid_nodes,
             regions,
             topology: surface.topology,
-            moved,
-            attachment,
-            stiffness,
-            factor,
             warnings,
-        })
+            spec: spec.clone(),
+            key,
+            mechanics: OnceLock::new(),
+        };
+        if object.proven.is_none() {
+            let rows_per_node = object.mechanics()?.factor.rows_per_node();
+            Cache::used().into_iter().for_each(|cache| cache.keep(&object.key, &[rows_per_node as u8]));
+        }
+        Ok(object)
     }
+
+    /// What its nodes resist by: formed when the object is built, or, where an earlier run has done so without an error,
+    /// when it is first asked for: what that run has kept may be enough.
+    ///
+    /// # Errors
+    /// As for [`Object::build`], when it is first asked for.
+    pub fn mechanics(&self) -> Result<&Mechanics, Error> {
+        if let Some(mechanics) = self.mechanics.get() {
+            return Ok(mechanics);
+        }
+        let formed = Arc::new(Mechanics::new(self)?);
+        Ok(self.mechanics.get_or_init(|| formed))
+    }
+
+    /// All that its compliance is made of, byte for byte.
+    #[must_use]
+    pub fn key(&self) -> &[u8] {
+        &self.key
+    }
+}
+
+/// See [`Object::key`]. Files count by what was read from them; mass and damping do not resist.
+fn key(spec: &ObjectSpec, body: &Body) -> Vec<u8> {
+    let ObjectSpec { shape: _, material, skin, ground, node_mass: _, node_damping: _ } = spec;
+    let Body { nodes, surface_nodes, triangles, tetrahedra, mid_nodes, regions } = body;
+    let counts = [nodes.len(), *surface_nodes, triangles.len(), tetrahedra.len(), mid_nodes.len(), regions.len()];
+    let mut key = format!("{material:?} {skin:?} {ground:?} {counts:?}").into_bytes();
+    nodes.iter().for_each(|node| key.extend(bytemuck::cast_slice(&node.to_array())));
+    for numbers in [triangles.as_flattened(), tetrahedra.as_flattened(), mid_nodes.as_flattened(), regions] {
+        key.extend_from_slice(bytemuck::cast_slice(numbers));
+    }
+    key
 }
 
 /// Most nodes of an object: its factor takes some GB then.
@@ -334,7 +299,6 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), Error> {
     Ok(())
 }
 
-/// Returns how messages call the surface.
 /// The error of a surface on which contact cannot be computed, because of `defect`.
 fn refused(spec: &ObjectSpec, defect: &str) -> Error {
     match &spec.shape {

@@ -1,6 +1,6 @@
 //! Where an object comes to rest under constant loads.
 
-use super::{Factor, Object, Stiffening};
+use super::{Factor, Mechanics, Stiffening};
 use crate::Error;
 use glam::DVec3;
 
@@ -12,15 +12,15 @@ const SETTLED: f64 = 1e-9;
 /// error, and kappa is at most 100.
 const STEPS: usize = 5000;
 
-/// Displacements at which the springs of `object` carry `loads`, one per node (N); springs stiffen as `stiffening`
+/// Displacements at which the springs in `mechanics` carry `loads`, one per node (N); springs stiffen as `stiffening`
 /// says. For these the energy is lowered by steps u += K1^-1 (loads - grad W(u)), each of which cannot fail to lower
 /// it.
 ///
 /// # Errors
 /// When there is no memory for the factor of K1.
-pub fn settled(object: &Object, loads: &[DVec3], stiffening: Option<&Stiffening>) -> Result<Vec<DVec3>, Error> {
+pub fn settled(mechanics: &Mechanics, loads: &[DVec3], stiffening: Option<&Stiffening>) -> Result<Vec<DVec3>, Error> {
     let mut displacement = loads.to_vec();
-    object.factor.solve(&mut displacement);
+    mechanics.factor.solve(&mut displacement);
     let Some(stiffening) = stiffening else { return Ok(displacement) };
     let factor = Factor::of(stiffening.bound(), 1.0, &vec![0.0; loads.len()])?;
     let size = |vectors: &[DVec3]| vectors.iter().map(|v| v.length_squared()).sum::<f64>().sqrt();

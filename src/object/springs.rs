@@ -5,29 +5,30 @@
 //! the diagonal block. Kn and Kg are positive semidefinite by construction, so K is singular only where a rigid motion
 //! or a mechanism is left free.
 
-use super::{Body, Stiffness, element::TETRAHEDRON_EDGES, refused, topology::coincident};
+use super::{Object, Stiffness, element::TETRAHEDRON_EDGES, refused, topology::coincident};
 use crate::{
     Error,
     scene::{ObjectSpec, SpringKind, SpringSpec},
 };
 use glam::{DMat3, DVec3};
 
-/// The edges along which the springs of `body` run, each once: those of its tetrahedra, or of its surface.
+/// The edges along which the springs of `object` run, each once: those of its tetrahedra, or of its surface.
 ///
 /// # Errors
 /// When the tetrahedra have nodes in the middles of their edges.
-pub(super) fn edges(body: &Body, surface: Vec<[u32; 2]>) -> Result<Vec<[u32; 2]>, Error> {
-    if body.tetrahedra.is_empty() {
-        return Ok(surface);
-    }
-    if !body.mid_nodes.is_empty() {
+pub(super) fn edges(object: &Object) -> Result<Vec<[u32; 2]>, Error> {
+    if !object.mid_nodes.is_empty() {
         return Err("springs run along tetrahedra of four nodes: save the mesh in first order (gmsh -order 1)".into());
     }
     let ends = |corners: &[u32; 4]| {
         let corners = *corners;
         TETRAHEDRON_EDGES.map(|[a, b]| [corners[a].min(corners[b]), corners[a].max(corners[b])])
     };
-    let mut edges: Vec<[u32; 2]> = body.tetrahedra.iter().flat_map(ends).collect();
+    let sides = |&[a, b, c]: &[u32; 3]| [[a.min(b), a.max(b)], [b.min(c), b.max(c)], [c.min(a), c.max(a)]];
+    let mut edges: Vec<[u32; 2]> = match &object.tetrahedra[..] {
+        [] => object.triangles.iter().flat_map(sides).collect(),
+        tetrahedra => tetrahedra.iter().flat_map(ends).collect(),
+    };
     edges.sort_unstable();
     edges.dedup();
     Ok(edges)

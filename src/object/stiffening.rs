@@ -11,7 +11,7 @@
 //! being K with springs kappa times as stiff: a step with K1 on the left and grad W(u) on the right takes at least what
 //! W gains. The matrix stays constant and positive definite; what it takes beyond that is numerical damping.
 
-use super::{Object, Stiffness};
+use super::{Mechanics, Stiffness};
 use glam::{DMat3, DVec3};
 
 /// The springs of an object that stiffen.
@@ -28,11 +28,11 @@ pub struct Stiffening {
 }
 
 impl Stiffening {
-    /// Stiffening of the springs of `object` to `factor` kappa > 1 times their stiffness, at strains beyond `strain`
+    /// Stiffening of the springs in `mechanics` to `factor` kappa > 1 times their stiffness, at strains beyond `strain`
     /// eps > 0.
     #[must_use]
-    pub fn new(object: &Object, factor: f64, strain: f64) -> Self {
-        let mut bound = object.stiffness.clone();
+    pub fn new(mechanics: &Mechanics, factor: f64, strain: f64) -> Self {
+        let mut bound = mechanics.stiffness.clone();
         let mut unit_strain_force = vec![0.0; bound.blocks.len()];
         for node in 0..bound.nodes() {
             let row = bound.offsets[node]..bound.offsets[node + 1];
@@ -47,7 +47,7 @@ impl Stiffening {
                 springs -= bound.blocks[entry];
                 bound.blocks[entry] *= factor;
                 unit_strain_force[entry] =
-                    stiffness(&bound.blocks[entry]) * object.rest[node].distance(object.rest[other]);
+                    stiffness(&bound.blocks[entry]) * mechanics.moved[node].distance(mechanics.moved[other]);
             }
             bound.blocks[diagonal] += (factor - 1.0) * springs;
         }
@@ -89,15 +89,15 @@ impl Stiffening {
         relief
     }
 
-    /// Elastic energy W of the object (J).
+    /// Elastic energy W of the object that `mechanics` belong to (J).
     #[must_use]
-    pub fn energy(&self, object: &Object, displacement: &[DVec3]) -> f64 {
-        let mut energy = object.stiffness.energy(displacement);
+    pub fn energy(&self, mechanics: &Mechanics, displacement: &[DVec3]) -> f64 {
+        let mut energy = mechanics.stiffness.energy(displacement);
         for node in 0..displacement.len() {
             for entry in self.bound.offsets[node]..self.bound.offsets[node + 1] {
                 let other = self.bound.columns[entry] as usize;
                 if other < node && self.unit_strain_force[entry] > 0.0 {
-                    let length = object.rest[node].distance(object.rest[other]);
+                    let length = mechanics.moved[node].distance(mechanics.moved[other]);
                     let pull = self.bound.blocks[entry] * (displacement[other] - displacement[node]);
                     let (r, eps) = (pull.length() / self.unit_strain_force[entry], self.strain);
                     let integral = 0.5 * (r * r.hypot(eps) + eps * eps * (r / eps).asinh()) - eps * r;
@@ -118,6 +118,7 @@ fn stiffness(block: &DMat3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::object::Object;
     use crate::scene::{GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SpringKind, SpringSpec};
 
     fn sphere(kind: SpringKind) -> Object {
@@ -149,20 +150,22 @@ mod tests {
     fn the_force_is_the_gradient_of_the_energy_and_grows_faster_than_linear() {
         for kind in [SpringKind::Isotropic, SpringKind::Axial] {
             let object = sphere(kind);
-            let stiffening = Stiffening::new(&object, 8.0, 0.1);
+            let mechanics = object.mechanics().unwrap();
+            let stiffening = Stiffening::new(mechanics, 8.0, 0.1);
             let (u, direction) = (field(object.rest.len(), 5e-3), field(object.rest.len(), 1.0));
             let moved = |h: f64| u.iter().zip(&direction).map(|(u, d)| *u + h * *d).collect::<Vec<_>>();
             let h = 1e-7;
-            let slope = (stiffening.energy(&object, &moved(h)) - stiffening.energy(&object, &moved(-h))) / (2.0 * h);
+            let slope =
+                (stiffening.energy(mechanics, &moved(h)) - stiffening.energy(mechanics, &moved(-h))) / (2.0 * h);
             let along: f64 = gradient(&stiffening, &u).iter().zip(&direction).map(|(f, d)| f.dot(*d)).sum();
             assert!((slope - along).abs() < 1e-6 * along.abs(), "{slope} {along}");
             // Between the linear energy and that of K1.
-            let (linear, bound) = (object.stiffness.energy(&u), stiffening.bound().energy(&u));
-            let energy = stiffening.energy(&object, &u);
+            let (linear, bound) = (mechanics.stiffness.energy(&u), stiffening.bound().energy(&u));
+            let energy = stiffening.energy(mechanics, &u);
             assert!(1.5 * linear < energy && energy < bound, "{linear} {energy} {bound}");
             // Small strains are linear.
             let small = field(object.rest.len(), 1e-9);
-            assert!((stiffening.energy(&object, &small) / object.stiffness.energy(&small) - 1.0).abs() < 1e-4);
+            assert!((stiffening.energy(mechanics, &small) / mechanics.stiffness.energy(&small) - 1.0).abs() < 1e-4);
         }
     }
 
@@ -170,14 +173,15 @@ mod tests {
     fn no_step_gains_more_than_the_bound_says() {
         for kind in [SpringKind::Isotropic, SpringKind::Axial] {
             let object = sphere(kind);
-            let stiffening = Stiffening::new(&object, 8.0, 0.02);
+            let mechanics = object.mechanics().unwrap();
+            let stiffening = Stiffening::new(mechanics, 8.0, 0.02);
             for (from, way) in [(0.0, 1e-2), (1e-3, 1e-4), (1e-2, -2e-2), (3e-2, 0.5)] {
                 let u = field(object.rest.len(), from);
                 let d: Vec<DVec3> = field(object.rest.len(), way).into_iter().rev().collect();
                 let after: Vec<DVec3> = u.iter().zip(&d).map(|(u, d)| *u + *d).collect();
                 let first: f64 = gradient(&stiffening, &u).iter().zip(&d).map(|(g, d)| g.dot(*d)).sum();
-                let model = stiffening.energy(&object, &u) + first + stiffening.bound().energy(&d);
-                assert!(stiffening.energy(&object, &after) <= model * (1.0 + 1e-12), "{kind:?} {from} {way}");
+                let model = stiffening.energy(mechanics, &u) + first + stiffening.bound().energy(&d);
+                assert!(stiffening.energy(mechanics, &after) <= model * (1.0 + 1e-12), "{kind:?} {from} {way}");
             }
         }
     }

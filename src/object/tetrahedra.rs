@@ -3,7 +3,7 @@
 //! A tetrahedron of four nodes is straight: nodes in the middles of its edges raise it to the second order. Ten nodes
 //! of a file may lie on a curved surface; place and displacement then have the same shape functions (isoparametric).
 
-use super::Body;
+use super::Object;
 use super::attachment::SurfacePoint;
 use super::element::{GAUSS, Lame, Quadrature, TETRAHEDRON_EDGES, TETRAHEDRON_NODES, tetrahedron as shape_functions};
 use super::inclusion::Materials;
@@ -53,15 +53,15 @@ pub(super) fn face_triangles(face: [usize; 3], is_curved: bool) -> Vec<[usize; 3
 }
 
 impl Tetrahedra {
-    /// The elements of `body`, whose surface is turned outward already.
-    pub fn new(body: &Body) -> Self {
-        let is_curved = !body.mid_nodes.is_empty();
-        let mut nodes = body.nodes.clone();
+    /// The elements of `object`.
+    pub fn new(object: &Object) -> Self {
+        let is_curved = !object.mid_nodes.is_empty();
+        let mut nodes = object.rest.clone();
         let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
-        let elements = body.tetrahedra.iter().enumerate().map(|(number, corners)| {
+        let elements = object.tetrahedra.iter().enumerate().map(|(number, corners)| {
             let mut element = [0; TETRAHEDRON_NODES];
             element[..4].copy_from_slice(corners);
-            if let Some(middles) = body.mid_nodes.get(number) {
+            if let Some(middles) = object.mid_nodes.get(number) {
                 element[4..].copy_from_slice(middles);
                 return element;
             }
@@ -83,7 +83,7 @@ impl Tetrahedra {
                 owners.insert(key, number);
             }
         }
-        let faces = body.triangles.iter().map(|triangle| {
+        let faces = object.triangles.iter().map(|triangle| {
             let mut key = *triangle;
             key.sort_unstable();
             let owner = owners.get(&key).copied().unwrap_or_default();
@@ -92,7 +92,7 @@ impl Tetrahedra {
             (owner, triangle.map(|node| barycentric(local(node))))
         });
         let faces = faces.collect();
-        Self { nodes, elements, regions: body.regions.clone(), is_curved, faces }
+        Self { nodes, elements, regions: object.regions.clone(), is_curved, faces }
     }
 
     fn region(&self, element: usize) -> Option<u32> {

@@ -45,8 +45,6 @@ impl Topology {
 /// The findings of [`close`].
 pub(super) struct ClosedSurface {
     pub topology: Topology,
-    /// Each edge once, as its two ends.
-    pub edges: Vec<[u32; 2]>,
     /// Nodes of each connected part, ascending.
     pub components: Vec<Vec<u32>>,
     pub warnings: Vec<String>,
@@ -63,18 +61,18 @@ pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<Close
     if let Some(node) = (0..nodes.len()).find(|&j| around_offsets[j] == around_offsets[j + 1]) {
         return Err(format!("node {node} belongs to no triangle: remove it"));
     }
-    let (edges, across) = pair_edges(triangles)?;
+    let across = pair_edges(triangles)?;
     // First of all: a closed surface with one side has no place in space without crossing itself.
     let parts = orient(triangles, &across)?;
     crossing::check(nodes, triangles)?;
     let mut warnings = Vec::new();
     turn_outward(nodes, triangles, &parts, &mut warnings)?;
     // Turning a triangle renumbers its edges, so the neighbours are found again.
-    let (_, across) = pair_edges(triangles)?;
+    let across = pair_edges(triangles)?;
     let topology = Topology { across, around_offsets, around };
     check_fans(&topology, triangles)?;
     let components = parts.iter().map(|part| nodes_of(&part.triangles, triangles)).collect();
-    Ok(ClosedSurface { topology, edges, components, warnings })
+    Ok(ClosedSurface { topology, components, warnings })
 }
 
 /// Mean length of the triangles' edges (m).
@@ -159,9 +157,8 @@ fn triangles_around(nodes: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>
 /// One side of an edge: its ends in ascending order, its triangle, and which of the triangle's edges it is.
 type Side = ([u32; 2], u32, usize);
 
-/// Each edge once, and the triangle across each edge of each triangle.
-#[expect(clippy::type_complexity)]
-fn pair_edges(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 2]>, Vec<[u32; 3]>), String> {
+/// The triangle across each edge of each triangle.
+fn pair_edges(triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, String> {
     let mut sides: Vec<Side> = Vec::with_capacity(3 * triangles.len());
     for (triangle, corners) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -170,14 +167,12 @@ fn pair_edges(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 2]>, Vec<[u32; 3]>), 
         }
     }
     sides.sort_unstable();
-    let mut edges = Vec::with_capacity(sides.len() / 2);
     let mut across = vec![[0; 3]; triangles.len()];
     let mut open = None;
     let mut open_edges = 0;
     for group in sides.chunk_by(|a, b| a.0 == b.0) {
         match group {
-            [(nodes, first, i), (_, second, j)] => {
-                edges.push(*nodes);
+            [(_, first, i), (_, second, j)] => {
                 across[*first as usize][*i] = *second;
                 across[*second as usize][*j] = *first;
             }
@@ -196,7 +191,7 @@ fn pair_edges(triangles: &[[u32; 3]]) -> Result<(Vec<[u32; 2]>, Vec<[u32; 3]>), 
             "the surface is open: edge {a} to {b} has a triangle on one side only ({triangle}); there are {open_edges} \
              such edges: close the holes, or merge vertices by distance"
         )),
-        None => Ok((edges, across)),
+        None => Ok(across),
     }
 }
 

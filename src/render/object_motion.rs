@@ -19,7 +19,7 @@
 
 use crate::{
     Error, error,
-    object::{Factor, Object, Stiffening, settled},
+    object::{Factor, Mechanics, Object, Stiffening, settled},
     scene::GraphicsEffects,
 };
 use glam::DVec3;
@@ -28,6 +28,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
 /// Displacements of all nodes of K, and their velocities where there are dynamics.
 pub struct ObjectMotion<'object> {
     object: &'object Object,
+    mechanics: &'object Mechanics,
     period: f64,
     /// Absent in quasi-static graphics.
     dynamics: Option<Dynamics>,
@@ -65,28 +66,29 @@ impl<'object> ObjectMotion<'object> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(error!("the time between frames is {period} s; it must be a positive number"));
         }
-        let zero = vec![DVec3::ZERO; object.moved.len()];
-        let stiffening = effects.stiffening.map(|spec| Stiffening::new(object, spec.factor, spec.strain));
+        let mechanics = object.mechanics()?;
+        let zero = vec![DVec3::ZERO; mechanics.moved.len()];
+        let stiffening = effects.stiffening.map(|spec| Stiffening::new(mechanics, spec.factor, spec.strain));
         let dynamics = if effects.quasi_static {
             None
         } else {
-            let inertia = object.mass.iter().zip(&object.damping);
+            let inertia = mechanics.mass.iter().zip(&mechanics.damping);
             let diagonal: Vec<f64> = inertia.map(|(m, b)| 2.0 * m / period + b).collect();
-            let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
+            let stiffness = stiffening.as_ref().map_or(&mechanics.stiffness, Stiffening::bound);
             let factor = Factor::of(stiffness, 0.5 * period, &diagonal)?;
             Some(Dynamics { factor, scales: stiffness.scales(), velocity: zero.clone() })
         };
-        let weight: Option<Vec<DVec3>> = effects.gravity.map(|g| object.mass.iter().map(|m| *m * g).collect());
+        let weight: Option<Vec<DVec3>> = effects.gravity.map(|g| mechanics.mass.iter().map(|m| *m * g).collect());
         let displacement = match &weight {
-            Some(weight) => settled(object, weight, stiffening.as_ref())?,
+            Some(weight) => settled(mechanics, weight, stiffening.as_ref())?,
             None => zero.clone(),
         };
-        let factor = dynamics.as_ref().map_or(&object.factor, |dynamics| &dynamics.factor);
+        let factor = dynamics.as_ref().map_or(&mechanics.factor, |dynamics| &dynamics.factor);
         let threads =
             factor.is_shared().then(|| ThreadPoolBuilder::new().thread_name(|k| format!("frame {k}")).build());
         let threads =
             threads.transpose().map_err(|error| error!("no threads can be had for the object's frames: {error}"))?;
-        Ok(Self { object, period, dynamics, stiffening, weight, displacement, right: zero, threads })
+        Ok(Self { object, mechanics, period, dynamics, stiffening, weight, displacement, right: zero, threads })
     }
 
     /// T (s).
@@ -97,8 +99,8 @@ impl<'object> ObjectMotion<'object> {
 
     /// Positions n = n0 + N u of the object's nodes (m).
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = DVec3> {
-        let Object { rest, attachment, .. } = self.object;
-        rest.iter().enumerate().map(|(node, rest)| rest + attachment.follow(node, &self.displacement))
+        let attachment = &self.mechanics.attachment;
+        self.object.rest.iter().enumerate().map(|(node, rest)| rest + attachment.follow(node, &self.displacement))
     }
 
     /// Displacements u of the nodes of K (m).
@@ -122,11 +124,11 @@ impl<'object> ObjectMotion<'object> {
     /// The same with the nodes displaced by `displacement` (m) and moving at `velocity` (m/s).
     #[must_use]
     pub fn energy_of(&self, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
-        let moving = self.object.mass.iter().zip(velocity);
+        let moving = self.mechanics.mass.iter().zip(velocity);
         let kinetic = 0.5 * moving.map(|(m, v)| m * v.length_squared()).sum::<f64>();
         let elastic = match &self.stiffening {
-            Some(stiffening) => stiffening.energy(self.object, displacement),
-            None => self.object.stiffness.energy(displacement),
+            Some(stiffening) => stiffening.energy(self.mechanics, displacement),
+            None => self.mechanics.stiffness.energy(displacement),
         };
         let weight = self.weight.iter().flatten().zip(displacement);
         kinetic + elastic - weight.map(|(w, u)| w.dot(*u)).sum::<f64>()
@@ -149,7 +151,7 @@ impl<'object> ObjectMotion<'object> {
     /// One frame under `forces`, one per node of the object (N). Returns v_hat of the nodes of K (m/s); in quasi-static
     /// graphics their displacements.
     pub fn step(&mut self, forces: &[DVec3]) -> &[DVec3] {
-        self.object.attachment.spread(forces, &mut self.right);
+        self.mechanics.attachment.spread(forces, &mut self.right);
         match self.threads.take() {
             None => self.frame(false),
             Some(threads) => {
@@ -169,11 +171,11 @@ impl<'object> ObjectMotion<'object> {
 
     /// Adds (2M/T) v - grad W(u) and the weight to the forces in `right`; in quasi-static graphics the weight alone.
     fn load(&self, right: &mut [DVec3], shared: bool) {
-        let Self { object, dynamics, stiffening, weight, displacement, .. } = self;
-        let stiffness = stiffening.as_ref().map_or(&object.stiffness, Stiffening::bound);
+        let Self { mechanics, dynamics, stiffening, weight, displacement, .. } = self;
+        let stiffness = stiffening.as_ref().map_or(&mechanics.stiffness, Stiffening::bound);
         let of_node = |(node, right): (usize, &mut DVec3)| {
             if let Some(Dynamics { velocity, scales, .. }) = dynamics {
-                let momentum = (2.0 * object.mass[node] / self.period) * velocity[node];
+                let momentum = (2.0 * mechanics.mass[node] / self.period) * velocity[node];
                 let held = match scales {
                     Some(scales) => stiffness.force_by_scales(scales, node, displacement),
                     None => stiffness.force_on(node, displacement),
@@ -197,7 +199,7 @@ impl<'object> ObjectMotion<'object> {
     /// v_hat from the right-hand side, and the new state.
     fn advance(&mut self) {
         let Some(Dynamics { factor, velocity, .. }) = &mut self.dynamics else {
-            self.object.factor.solve(&mut self.right);
+            self.mechanics.factor.solve(&mut self.right);
             self.displacement.copy_from_slice(&self.right);
             return;
         };

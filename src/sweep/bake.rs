@@ -125,7 +125,7 @@ impl Bake<'_> {
             }
         }
         sweep.aim_at(aim);
-        let error = object.lattice_error(&scene.object, &model.compliance);
+        let error = object.lattice_error(&model.compliance);
         sweep
             .warnings
             .extend(error.filter(LatticeError::is_large).map(|error| format!("the lattice is coarse: {error}")));

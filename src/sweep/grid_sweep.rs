@@ -130,7 +130,7 @@ impl<'a> Sweep<'a> {
             with_forces,
             grid,
             shard: Shard::WHOLE,
-            object: content(object),
+            object: crc32fast::hash(object.key()),
             surface: Surface::of(object),
             scene: scene.text.clone(),
             scene_path: std::path::absolute(&scene.path).unwrap_or_default().to_string_lossy().into_owned(),
@@ -435,14 +435,4 @@ pub(super) fn check_given(scene: &Scene) -> Result<(), Error> {
 pub(super) fn check_axes(scene: &Scene) -> Result<(), Error> {
     let joints = scene.proxy.joints.len();
     if joints > MAX_AXES { Err(too_many_joints(joints)) } else { Ok(()) }
-}
-
-/// CRC-32 of all that contact knows of `object`.
-fn content(object: &Object) -> u32 {
-    let mut hasher = crc32fast::Hasher::new();
-    object.rest.iter().for_each(|node| hasher.update(bytemuck::cast_slice(&node.to_array())));
-    hasher.update(bytemuck::cast_slice(&object.triangles));
-    hasher.update(bytemuck::cast_slice(&object.stiffness.columns));
-    object.stiffness.blocks.iter().for_each(|block| hasher.update(bytemuck::cast_slice(&block.to_cols_array())));
-    hasher.finalize()
 }

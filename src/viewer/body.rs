@@ -5,6 +5,7 @@ use crate::{
     Error, JointVector,
     contact::Status,
     gpu::{Context, FrameMethod, FrameUpdate, GpuError},
+    object::Mechanics,
     render::{
         graphics::{ContactForces, DrawnForces},
         session::Latest,
@@ -49,7 +50,7 @@ impl Body {
             return Ok(None);
         };
         let relaxation = loaded.setup.scene.haptics.relaxation.as_ref();
-        let (nodes, method) = (object.rest.len(), FrameMethod::suitable(object));
+        let (nodes, method) = (object.rest.len(), FrameMethod::suitable(object.mechanics()?));
         let graphics = GraphicsSpec { effects: *effects, ..*graphics };
         let period = 1.0 / graphics.rate;
         let update =
@@ -58,7 +59,7 @@ impl Body {
             surface: Surface::new(context, object, &update)?,
             update,
             rest: object.rest.iter().map(|point| point.as_vec3()).collect(),
-            extremes: extremes(loaded),
+            extremes: extremes(loaded)?,
             contact: Arc::clone(contact),
             forces: DrawnForces::new(nodes, &graphics, relaxation),
             period,
@@ -98,18 +99,19 @@ impl Body {
 const INSTANTS: usize = 50;
 
 /// Returns [`Body::extremes`]: those where most is pressed.
-fn extremes(loaded: &Loaded) -> [f64; 2] {
+fn extremes(loaded: &Loaded) -> Result<[f64; 2], Error> {
     let (Some(object), Some(forces), Some(q)) = (&loaded.setup.object, &loaded.forces, deepest(loaded)) else {
-        return [0.0; 2];
+        return Ok([0.0; 2]);
     };
+    let Mechanics { moved, attachment, factor, .. } = object.mechanics()?;
     let mut acting = vec![DVec3::ZERO; object.rest.len()];
     forces.at(&q, 1.0, &mut acting);
     let largest = |sizes: &mut dyn Iterator<Item = DVec3>| sizes.map(|vector| vector.length()).fold(0.0, f64::max);
-    let mut displacement = vec![DVec3::ZERO; object.moved.len()];
-    object.attachment.spread(&acting, &mut displacement);
-    object.factor.solve(&mut displacement);
-    let followers = &mut (0..object.surface_nodes).map(|node| object.attachment.follow(node, &displacement));
-    [largest(followers), largest(&mut acting.into_iter())]
+    let mut displacement = vec![DVec3::ZERO; moved.len()];
+    attachment.spread(&acting, &mut displacement);
+    factor.solve(&mut displacement);
+    let followers = &mut (0..object.surface_nodes).map(|node| attachment.follow(node, &displacement));
+    Ok([largest(followers), largest(&mut acting.into_iter())])
 }
 
 /// The configuration of the motions, or else of the whole dataset, at which the energy is greatest, or the torque.

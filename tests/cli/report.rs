@@ -177,7 +177,7 @@ fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
         let (_, forces, _) = touch(chain, object, &tick.proxy);
         let mut displacement = vec![DVec3::ZERO; object.rest.len()];
         forces.iter().for_each(|&(node, force)| displacement[node as usize] = force);
-        object.factor.solve(&mut displacement);
+        object.mechanics().unwrap().factor.solve(&mut displacement);
         let nodes = object.rest.iter().zip(&displacement).map(|(rest, u)| *rest + *u);
         Frame { time: tick.time, proxy: tick.proxy, nodes: nodes.take(object.surface_nodes).collect() }
     };

@@ -9,10 +9,10 @@ use std::{
 /// The program's file.
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_haptize");
 
-/// A command of the program in `folder`.
+/// A command of the program in `folder`, with a cache apart from the user's.
 pub fn command(folder: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(PROGRAM);
-    command.args(arguments).current_dir(folder);
+    command.args(arguments).current_dir(folder).env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"));
     command
 }
 

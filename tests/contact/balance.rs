@@ -165,7 +165,7 @@ fn the_residual_of_rigid_contact_is_the_imbalance_of_forces() {
         }
         let u: Vec<DVec3> = solver.displacement().chunks_exact(3).map(DVec3::from_slice).collect();
         let mut held_by = vec![DVec3::ZERO; u.len()];
-        object.stiffness.apply(&u, &mut held_by);
+        object.mechanics().unwrap().stiffness.apply(&u, &mut held_by);
         let mut pushed = vec![DVec3::ZERO; u.len()];
         found.forces.iter().for_each(|force| pushed[force.node as usize] = force.force);
         let respond = |j: usize| -> DVec3 {

@@ -27,7 +27,7 @@ pub fn displacement(object: &Object, forces: &[DVec3]) -> Vec<DVec3> {
         if square <= stop {
             break;
         }
-        object.stiffness.apply(&p, &mut image);
+        object.mechanics().unwrap().stiffness.apply(&p, &mut image);
         let share = square / inner(&p, &image);
         for k in 0..u.len() {
             u[k] += p[k] * share;

@@ -38,9 +38,9 @@ fn sphere(centre: DVec3, radius: f64, young: f64, poisson: f64) -> InclusionSpec
 
 /// Forces on the nodes of K under the displacement `u`.
 fn forces(object: &Object, u: impl Fn(DVec3) -> DVec3) -> Vec<DVec3> {
-    let displacement: Vec<DVec3> = object.moved.iter().map(|x| u(*x)).collect();
+    let displacement: Vec<DVec3> = object.mechanics().unwrap().moved.iter().map(|x| u(*x)).collect();
     let mut forces = vec![DVec3::ZERO; displacement.len()];
-    object.stiffness.apply(&displacement, &mut forces);
+    object.mechanics().unwrap().stiffness.apply(&displacement, &mut forces);
     forces
 }
 
@@ -98,7 +98,7 @@ fn check_series(object: &Object, height: f64, interface: f64, area: f64, young: 
         DVec3::Z * stress * (low / young[0] + high / young[1])
     };
     let mut top = DVec3::ZERO;
-    for (x, force) in object.moved.iter().zip(forces(object, stretch)) {
+    for (x, force) in object.mechanics().unwrap().moved.iter().zip(forces(object, stretch)) {
         if x.z > height - 1e-6 {
             top += force;
         } else if x.z > 1e-6 {
@@ -122,7 +122,7 @@ fn layers_by_region_are_springs_in_series_and_outlive_the_file() {
         // A dataset holds the regions: the file is no longer needed.
         drop(folder);
         let stored = Surface::of(&object).object(&spec).unwrap();
-        assert_eq!(stored.stiffness, object.stiffness);
+        assert_eq!(stored.mechanics().unwrap().stiffness, object.mechanics().unwrap().stiffness);
         // What names no part of the solid is refused.
         let nowhere = InclusionSpec { place: InclusionPlace::Region(3), ..upper };
         let material =
@@ -155,8 +155,8 @@ fn ball(cell: f64, inclusions: Vec<InclusionSpec>) -> Result<Object, Error> {
 fn an_inclusion_like_the_rest_changes_nothing() {
     let same = sphere(DVec3::new(0.01, 0.0, 0.02), 0.02, YOUNG, 0.3);
     let (plain, same) = (ball(0.01, vec![]).unwrap(), ball(0.01, vec![same]).unwrap());
-    let scale = plain.stiffness.norm();
-    for (a, b) in plain.stiffness.blocks.iter().zip(&same.stiffness.blocks) {
+    let scale = plain.mechanics().unwrap().stiffness.norm();
+    for (a, b) in plain.mechanics().unwrap().stiffness.blocks.iter().zip(&same.mechanics().unwrap().stiffness.blocks) {
         assert!((*a - *b).to_cols_array().iter().all(|x| x.abs() < 1e-13 * scale));
     }
 }
@@ -174,10 +174,11 @@ fn a_composite_sphere_has_hashins_bulk_modulus() {
             let force = 0.5 * (b - a).cross(c - a) / 3.0;
             triangle.iter().for_each(|&node| forces[node as usize] += force);
         }
-        let mut u = vec![DVec3::ZERO; object.moved.len()];
-        object.attachment.spread(&forces, &mut u);
-        object.factor.solve(&mut u);
-        let outward = |node: usize| object.attachment.follow(node, &u).dot(object.rest[node].normalize());
+        let mut u = vec![DVec3::ZERO; object.mechanics().unwrap().moved.len()];
+        object.mechanics().unwrap().attachment.spread(&forces, &mut u);
+        object.mechanics().unwrap().factor.solve(&mut u);
+        let outward =
+            |node: usize| object.mechanics().unwrap().attachment.follow(node, &u).dot(object.rest[node].normalize());
         (0..object.surface_nodes).map(outward).sum::<f64>() / object.surface_nodes as f64
     };
     let plain = [0.02, 0.01].map(|cell| ball(cell, vec![]).unwrap());
@@ -207,11 +208,17 @@ fn the_last_of_overlapping_inclusions_counts() {
     let (plain, hollow) = (ball(vec![]).unwrap(), ball(vec![stiff, core]).unwrap());
     // Near the middle the core is like the plain ball, and farther out it is not.
     let same = |near: DVec3| {
-        let node = (0..plain.moved.len())
-            .min_by(|&a, &b| plain.moved[a].distance(near).total_cmp(&plain.moved[b].distance(near)));
-        let rows = node.into_iter().flat_map(|node| plain.stiffness.row(node).zip(hollow.stiffness.row(node)));
-        rows.into_iter()
-            .all(|((_, a), (_, b))| (*a - *b).to_cols_array().iter().all(|x| x.abs() < 1e-12 * plain.stiffness.norm()))
+        let node = (0..plain.mechanics().unwrap().moved.len()).min_by(|&a, &b| {
+            plain.mechanics().unwrap().moved[a]
+                .distance(near)
+                .total_cmp(&plain.mechanics().unwrap().moved[b].distance(near))
+        });
+        let rows = node.into_iter().flat_map(|node| {
+            plain.mechanics().unwrap().stiffness.row(node).zip(hollow.mechanics().unwrap().stiffness.row(node))
+        });
+        rows.into_iter().all(|((_, a), (_, b))| {
+            (*a - *b).to_cols_array().iter().all(|x| x.abs() < 1e-12 * plain.mechanics().unwrap().stiffness.norm())
+        })
     };
     assert!(same(DVec3::ZERO) && !same(DVec3::X * 0.025));
     for hidden in [vec![core, stiff], vec![stiff, sphere(DVec3::X, 0.01, 1e5, 0.3)]] {

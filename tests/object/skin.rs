@@ -29,7 +29,7 @@ fn build(spec: &ObjectSpec) -> Object {
 
 fn apply(object: &Object, displacement: &[DVec3]) -> Vec<DVec3> {
     let mut force = vec![DVec3::NAN; displacement.len()];
-    object.stiffness.apply(displacement, &mut force);
+    object.mechanics().unwrap().stiffness.apply(displacement, &mut force);
     force
 }
 
@@ -58,7 +58,7 @@ fn a_translation_costs_the_foundation_alone() {
     let object = build(&hollow(6, SKIN));
     let shift = DVec3::new(0.3, -0.1, 0.7);
     let force = apply(&object, &vec![shift; object.rest.len()]);
-    let scale = object.stiffness.norm();
+    let scale = object.mechanics().unwrap().stiffness.norm();
     let total: DVec3 = force.iter().sum();
     // The area of the triangles, a little less than the sphere's.
     let area: f64 = object
@@ -75,7 +75,9 @@ fn a_translation_costs_the_foundation_alone() {
     }
     // A turn is resisted: an isotropic skin does not tell it from a strain.
     let turn: Vec<DVec3> = object.rest.iter().map(|node| DVec3::Z.cross(*node - CENTRE)).collect();
-    assert!(object.stiffness.energy(&turn) > 1.01 * bare.stiffness.energy(&turn));
+    assert!(
+        object.mechanics().unwrap().stiffness.energy(&turn) > 1.01 * bare.mechanics().unwrap().stiffness.energy(&turn)
+    );
 }
 
 /// Bending stiffness at which the foundation of 1 N/m^3 still leaves the factorisation its digits (N m).
@@ -89,9 +91,10 @@ fn ratios(divisions: usize, degree: u32, mean_square: f64, harmonic: fn(DVec3) -
     let skins = [SkinSpec { tension: 1.0, ..unit }, SkinSpec { bending: BENDING, ..unit }];
     let object = build(&hollow(divisions, unit));
     let field: Vec<DVec3> = object.rest.iter().map(|node| harmonic((*node - CENTRE) / RADIUS) * DVec3::X).collect();
-    let norm = object.stiffness.energy(&field);
+    let norm = object.mechanics().unwrap().stiffness.energy(&field);
     let eigenvalue = f64::from(degree * (degree + 1)) / (RADIUS * RADIUS);
-    let [tension, bending] = skins.map(|skin| build(&hollow(divisions, skin)).stiffness.energy(&field) / norm - 1.0);
+    let [tension, bending] =
+        skins.map(|skin| build(&hollow(divisions, skin)).mechanics().unwrap().stiffness.energy(&field) / norm - 1.0);
     let area = 4.0 * std::f64::consts::PI * RADIUS * RADIUS;
     [tension / eigenvalue, bending / (BENDING * eigenvalue * eigenvalue), 2.0 * norm / (mean_square * area)]
 }
@@ -136,6 +139,8 @@ fn every_term_is_positive_semidefinite_on_obtuse_meshes() {
                 even.triangles.clone(),
             )
             .unwrap()
+            .mechanics()
+            .unwrap()
             .stiffness
             .norm();
             let foundation = 1e-7 * norm / (edge * edge);
@@ -145,9 +150,9 @@ fn every_term_is_positive_semidefinite_on_obtuse_meshes() {
                 even.triangles.clone(),
             )
             .unwrap();
-            assert!(object.stiffness.is_isotropic());
+            assert!(object.mechanics().unwrap().stiffness.is_isotropic());
             for k in 0..object.rest.len() {
-                let row: f64 = object.stiffness.row(k).map(|(_, block)| block.x_axis.x).sum();
+                let row: f64 = object.mechanics().unwrap().stiffness.row(k).map(|(_, block)| block.x_axis.x).sum();
                 assert!(row > 0.0 && row < 1e-6 * norm, "row {k} sums to {row}, of {norm}");
             }
         }
@@ -158,7 +163,7 @@ fn every_term_is_positive_semidefinite_on_obtuse_meshes() {
 fn compliance(object: &Object) -> f64 {
     let mut displacement = vec![DVec3::ZERO; object.rest.len()];
     displacement[0] = DVec3::Z;
-    object.factor.solve(&mut displacement);
+    object.mechanics().unwrap().factor.solve(&mut displacement);
     displacement[0].z
 }
 
@@ -197,10 +202,12 @@ fn a_skin_adds_to_springs_and_to_solids_what_it_is_alone() {
         let bare = build(&ObjectSpec { skin: None, ..both.clone() });
         let both = build(&both);
         assert!(bare.skin.is_none() && both.skin == alone.skin);
-        let field = Random::vectors(both.moved.len(), 3);
-        let followers: Vec<DVec3> = (0..alone.rest.len()).map(|node| both.attachment.follow(node, &field)).collect();
-        let expected = bare.stiffness.energy(&field) + alone.stiffness.energy(&followers);
-        assert!((both.stiffness.energy(&field) / expected - 1.0).abs() < 1e-12);
+        let field = Random::vectors(both.mechanics().unwrap().moved.len(), 3);
+        let followers: Vec<DVec3> =
+            (0..alone.rest.len()).map(|node| both.mechanics().unwrap().attachment.follow(node, &field)).collect();
+        let expected = bare.mechanics().unwrap().stiffness.energy(&field)
+            + alone.mechanics().unwrap().stiffness.energy(&followers);
+        assert!((both.mechanics().unwrap().stiffness.energy(&field) / expected - 1.0).abs() < 1e-12);
     }
 }
 

@@ -46,7 +46,11 @@ fn every_kind_of_object_is_felt_drawn_and_inspected_without_its_scene_and_mesh()
         let (built, stored) =
             (Object::build(&scene.object).unwrap(), dataset.surface.as_ref().unwrap().object(&scene.object).unwrap());
         assert!(built.rest == stored.rest && built.triangles == stored.triangles, "{name}");
-        assert_eq!(built.stiffness, stored.stiffness, "{name}: what is stored is what was baked");
+        assert_eq!(
+            built.mechanics().unwrap().stiffness,
+            stored.mechanics().unwrap().stiffness,
+            "{name}: what is stored is what was baked"
+        );
         let at_home = answers(home.path());
         assert!(at_home.len() > 12, "{:?}", at_home.keys());
         home.close().unwrap();

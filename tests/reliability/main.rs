@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod alone;
+mod cache;
 #[path = "../common/mod.rs"]
 mod common;
 mod crash;

@@ -228,18 +228,18 @@ fn a_frame_without_effects_is_the_papers_to_the_last_bit() {
     let object = plain.setup.object.as_ref().unwrap();
     let places = plain.places(&plain.felt());
     let period = 1.0 / 60.0;
-    let inertia = || object.mass.iter().zip(&object.damping);
+    let inertia = || object.mechanics().unwrap().mass.iter().zip(&object.mechanics().unwrap().damping);
     let diagonal: Vec<f64> = inertia().map(|(m, b)| 2.0 * m / period + b).collect();
-    let factor = Factor::of(&object.stiffness, 0.5 * period, &diagonal).unwrap();
+    let factor = Factor::of(&object.mechanics().unwrap().stiffness, 0.5 * period, &diagonal).unwrap();
     let forces = haptize::render::graphics::ContactForces::new(&plain.data, object.rest.len()).unwrap();
     let zero = vec![DVec3::ZERO; object.rest.len()];
     let (mut u, mut v, mut f, mut right) = (zero.clone(), zero.clone(), zero.clone(), zero);
     let mut most: f64 = 0.0;
     for ((q, share), nodes) in places.iter().zip(plain.drawn(&places)) {
         forces.at(q, *share, &mut f);
-        object.stiffness.apply(&u, &mut right);
+        object.mechanics().unwrap().stiffness.apply(&u, &mut right);
         for (k, right) in right.iter_mut().enumerate() {
-            *right = f[k] + (2.0 * object.mass[k] / period) * v[k] - *right;
+            *right = f[k] + (2.0 * object.mechanics().unwrap().mass[k] / period) * v[k] - *right;
         }
         factor.solve(&mut right);
         for (k, v_hat) in right.iter().enumerate() {

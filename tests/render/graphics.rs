@@ -10,16 +10,19 @@ use haptize::{
     },
 };
 
-fn sphere(kind: SpringKind, stiffness: f64, rings: usize) -> Object {
-    Object::build(&ObjectSpec {
+fn spec(kind: SpringKind, stiffness: f64, rings: usize) -> ObjectSpec {
+    ObjectSpec {
         shape: Shape::Sphere { centre: DVec3::ZERO, radius: 0.05, rings, segments: rings },
         material: Material::Springs(SpringSpec { kind, stiffness }),
         skin: None,
         ground: Some(GroundSpec { stiffness: GroundStiffness::PerNode(0.3 * stiffness), nodes: GroundNodes::All }),
         node_mass: 1e-3,
         node_damping: 0.02,
-    })
-    .unwrap()
+    }
+}
+
+fn sphere(kind: SpringKind, stiffness: f64, rings: usize) -> Object {
+    Object::build(&spec(kind, stiffness, rings)).unwrap()
 }
 
 const NONE: GraphicsEffects = GraphicsEffects { gravity: None, stiffening: None, smoothing: None, quasi_static: false };
@@ -87,7 +90,11 @@ fn frames_that_threads_share_solve_their_equation() {
     let period = 1.0 / 60.0;
     for (kind, rings) in [(SpringKind::Isotropic, 150), (SpringKind::Axial, 60)] {
         let object = sphere(kind, 300.0, rings);
-        assert!(object.factor.is_shared(), "{kind:?}: {} B are too few", object.factor.bytes());
+        assert!(
+            object.mechanics().unwrap().factor.is_shared(),
+            "{kind:?}: {} B are too few",
+            object.mechanics().unwrap().factor.bytes()
+        );
         let nodes = object.rest.len();
         let gravity = GraphicsEffects { gravity: Some(GRAVITY), ..NONE };
         let mut motion = ObjectMotion::new(&object, period, &gravity).unwrap();
@@ -96,13 +103,14 @@ fn frames_that_threads_share_solve_their_equation() {
             let forces = push(nodes, frame, 1e-3);
             let v_hat = motion.step(&forces);
             let [mut held, mut bent] = [vec![DVec3::ZERO; nodes], vec![DVec3::ZERO; nodes]];
-            object.stiffness.apply(&u, &mut held);
-            object.stiffness.apply(v_hat, &mut bent);
+            object.mechanics().unwrap().stiffness.apply(&u, &mut held);
+            object.mechanics().unwrap().stiffness.apply(v_hat, &mut bent);
             let (mut left, mut size) = (0.0f64, 0.0f64);
             for k in 0..nodes {
-                let mass = object.mass[k];
+                let mass = object.mechanics().unwrap().mass[k];
                 let given = (2.0 * mass / period) * v[k] - held[k] + forces[k] + mass * GRAVITY;
-                let taken = (2.0 * mass / period + object.damping[k]) * v_hat[k] + 0.5 * period * bent[k];
+                let taken =
+                    (2.0 * mass / period + object.mechanics().unwrap().damping[k]) * v_hat[k] + 0.5 * period * bent[k];
                 (left, size) = (left.max((given - taken).length()), size.max(given.length()));
             }
             assert!(size > 1e-3 && left < 1e-10 * size, "{kind:?}, frame {frame}: {left} of {size}");
@@ -128,8 +136,7 @@ fn under_gravity_the_object_hangs_by_its_compliance_and_stays_there() {
 
 #[test]
 fn stiffened_springs_settle_where_they_balance_the_forces_and_yield_less() {
-    let mut object = sphere(SpringKind::Axial, 300.0, 8);
-    object.damping.fill(5.0);
+    let object = Object::build(&ObjectSpec { node_damping: 5.0, ..spec(SpringKind::Axial, 300.0, 8) }).unwrap();
     let settle = |effects: &GraphicsEffects| {
         let mut motion = ObjectMotion::new(&object, 0.02, effects).unwrap();
         let mut forces = vec![DVec3::ZERO; object.rest.len()];
@@ -156,7 +163,7 @@ fn quasi_static_graphics_takes_its_equilibrium_at_once_and_holds_no_motion() {
     let forces = push(object.rest.len(), 3, 0.1);
     motion.step(&forces);
     let mut held = vec![DVec3::ZERO; forces.len()];
-    object.stiffness.apply(motion.displacement(), &mut held);
+    object.mechanics().unwrap().stiffness.apply(motion.displacement(), &mut held);
     for (held, force) in held.iter().zip(&forces) {
         assert!((*held - *force - 1e-3 * GRAVITY).length() < 1e-10);
     }
@@ -183,12 +190,15 @@ fn what_is_not_named_takes_no_memory() {
     let vectors = |count: usize| count * object.rest.len() * size_of::<DVec3>();
     let [none, gravity, stiffening, _] = effects(4.0).map(|effects| bytes(&effects));
     assert_eq!(gravity - none, vectors(1));
-    assert_eq!(stiffening - none, object.stiffness.blocks.len() * (size_of::<glam::DMat3>() + size_of::<f64>()));
+    assert_eq!(
+        stiffening - none,
+        object.mechanics().unwrap().stiffness.blocks.len() * (size_of::<glam::DMat3>() + size_of::<f64>())
+    );
     // Without dynamics neither velocities nor a second factor.
     assert_eq!(bytes(&GraphicsEffects { quasi_static: true, ..NONE }), vectors(2));
     // Isotropic springs are multiplied with one number a block.
-    let scales = object.stiffness.blocks.len() * size_of::<f64>();
-    assert_eq!(none, vectors(3) + object.factor.bytes() + scales);
+    let scales = object.mechanics().unwrap().stiffness.blocks.len() * size_of::<f64>();
+    assert_eq!(none, vectors(3) + object.mechanics().unwrap().factor.bytes() + scales);
     // Smoothing lives where the forces are made, and nowhere else.
     assert_eq!(bytes(&GraphicsEffects { smoothing: Some(0.1), ..NONE }), none);
 }

@@ -37,7 +37,7 @@ fn check_equilibria(scene: &Scene) -> usize {
         // K u of the displacement, against the forces as they went through the file.
         let u: Vec<DVec3> = solver.displacement().chunks_exact(3).map(DVec3::from_slice).collect();
         let mut elastic = vec![DVec3::ZERO; u.len()];
-        object.stiffness.apply(&u, &mut elastic);
+        object.mechanics().unwrap().stiffness.apply(&u, &mut elastic);
         let mut stored = vec![DVec3::ZERO; u.len()];
         for contact in dataset.forces(point) {
             stored[contact.node as usize] = contact.force;

@@ -6,6 +6,7 @@
 //! Coordinates become `scale * coordinate + centre`.
 
 mod boundary;
+mod division;
 mod msh;
 mod obj;
 mod ply;

@@ -1,15 +1,18 @@
 //! Tetrahedra from Gmsh files, ASCII of versions 2.2 and 4.1.
 //!
 //! Read are `$MeshFormat`, `$Nodes` (or `$ParametricNodes`), the physical volumes in `$Entities` and
-//! `$PartitionedEntities` (4.1) and the elements of type 4 or 11 (tetrahedra of four or of ten nodes) in `$Elements`;
-//! points, lines and triangles, which Gmsh writes for boundaries, and all other sections are read past, and other
-//! volume elements are refused. A tetrahedron that is written once for each of its physical volumes counts once. The
-//! surface is what it always is: the faces that belong to one tetrahedron only. Every error names the line. Nothing is
-//! reserved for what a file announces before it is there.
+//! `$PartitionedEntities` (4.1) and the volume elements of first and second order in `$Elements`, which become
+//! tetrahedra of that order; points, lines and triangles, which Gmsh writes for boundaries, and all other sections are
+//! read past, and elements of higher order are refused. An element that is written once for each of its physical
+//! volumes counts once. The surface is what it always is: the faces that belong to one tetrahedron only. Every error
+//! names the line. Nothing is reserved for what a file announces before it is there.
 
-use super::text;
+use super::{
+    division::{Kind, Middle},
+    text,
+};
+use crate::object::element::TETRAHEDRON_EDGES;
 use glam::DVec3;
-use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 use std::io::BufRead;
 
@@ -31,6 +34,8 @@ struct Tetrahedra<'a> {
     regions: Vec<u32>,
     /// Their numbers, by their corners in ascending order.
     numbers: HashMap<[u32; 4], usize>,
+    /// Nodes in the middles of edges that a division has made, by the ends of these in ascending order.
+    middles: HashMap<[u32; 2], u32>,
     /// Physical volume of each volume of the geometry (version 4.1), by Gmsh's tags.
     volumes: HashMap<i64, u32>,
     /// Elements of other types, by Gmsh's numbers of these.
@@ -40,21 +45,30 @@ struct Tetrahedra<'a> {
 }
 
 impl Tetrahedra<'_> {
-    /// `nodes`: four corners, and in second order six nodes in the middles of edges.
-    fn add(&mut self, nodes: &[u32], region: u32) {
-        let Some((&corners, middles)) = nodes.split_first_chunk() else { return };
-        let mut key = corners;
-        key.sort_unstable();
-        match self.numbers.entry(key) {
-            Entry::Occupied(number) => {
-                let known = &mut self.regions[*number.get()];
+    /// Adds an element of `kind`; `of_element` are its nodes, numbers of `nodes`.
+    fn add(&mut self, kind: Kind, of_element: &[u32], region: u32, nodes: &mut Nodes) {
+        for corners in kind.tetrahedra(of_element) {
+            let tetrahedron = corners.map(|corner| of_element[corner]);
+            let mut key = tetrahedron;
+            key.sort_unstable();
+            if let Some(&number) = self.numbers.get(&key) {
+                let known = &mut self.regions[number];
                 *known = choice(&[*known, region], self.wanted);
+                continue;
             }
-            Entry::Vacant(free) => {
-                free.insert(self.corners.len());
-                self.corners.push(corners);
-                self.mid_nodes.extend(middles.as_chunks().0);
-                self.regions.push(region);
+            self.numbers.insert(key, self.corners.len());
+            self.corners.push(tetrahedron);
+            self.regions.push(region);
+            if kind.is_second_order() {
+                let middle = |edge: [usize; 2]| match kind.middle(of_element, edge.map(|end| corners[end])) {
+                    Middle::Node(node) => node,
+                    Middle::Sum([a, b], sum) => *self.middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                        let place = sum.iter().map(|&(node, weight)| weight * nodes.positions[node as usize]).sum();
+                        nodes.positions.push(place);
+                        nodes.positions.len() as u32 - 1
+                    }),
+                };
+                self.mid_nodes.push(TETRAHEDRON_EDGES.map(middle));
             }
         }
     }
@@ -71,22 +85,21 @@ impl Tetrahedra<'_> {
         };
         if !volumes.is_empty() {
             return Err(format!(
-                "its volume has {} beside {} tetrahedra of four or ten nodes, which alone are read: mesh all of it \
-                 with tetrahedra of first or second order (gmsh -3 -order 2, without Recombine and layers)",
+                "its volume has {}, of another order than the first and the second, which alone are read: save it in \
+                 one of these (gmsh -3 -order 2)",
                 listed(&volumes),
-                self.corners.len()
             ));
         }
         if !self.mid_nodes.is_empty() && self.mid_nodes.len() != self.corners.len() {
             return Err(
-                "it has tetrahedra of four nodes beside some of ten: save all in one order (gmsh -order 2)".into()
+                "it has elements of first order beside some of second: save all in one order (gmsh -order 2)".into()
             );
         }
         if self.corners.is_empty() {
             let others: Vec<(u64, u64)> = self.others.iter().map(|(kind, count)| (*kind, *count)).collect();
             let only = if others.is_empty() { String::new() } else { format!(", but {}", listed(&others)) };
             return Err(format!(
-                "it has no tetrahedra of four or ten nodes{only}: mesh the volume (gmsh -3 -order 2); where there are \
+                "it has no tetrahedra, hexahedra, prisms or pyramids{only}: mesh the volume (gmsh -3 -order 2); where there are \
                  physical groups, Gmsh saves only what is in one"
             ));
         }
@@ -100,15 +113,6 @@ fn choice(groups: &[u32], wanted: &[u32]) -> u32 {
     named.or_else(|| groups.iter().find(|group| **group != 0)).copied().unwrap_or(0)
 }
 
-/// Number of nodes of an element of Gmsh's type `kind`, if it is a tetrahedron of first or second order.
-fn nodes_of(kind: u64) -> Option<usize> {
-    match kind {
-        4 => Some(4),
-        11 => Some(10),
-        _ => None,
-    }
-}
-
 /// Is that Gmsh's number for a point, a line, a triangle, a quadrangle or a polygon, of any order?
 fn is_boundary(kind: u64) -> bool {
     matches!(kind, 1..=3 | 8..=10 | 15 | 16 | 20..=28 | 34 | 36..=70 | 84..=86 | 133..=135 | 138)
@@ -120,9 +124,6 @@ fn name(kind: u64) -> &'static str {
         1 | 8 => "lines",
         2 | 9 => "triangles",
         3 | 10 | 16 => "quadrangles",
-        5 | 12 | 17 => "hexahedra",
-        6 | 13 | 18 => "prisms",
-        7 | 14 | 19 => "pyramids",
         15 => "points",
         _ => "elements",
     }
@@ -139,6 +140,7 @@ pub(super) fn read(stream: &mut impl BufRead, wanted: &[u32]) -> Result<Mesh, St
         mid_nodes: Vec::new(),
         regions: Vec::new(),
         numbers: HashMap::new(),
+        middles: HashMap::new(),
         volumes: HashMap::new(),
         others: BTreeMap::new(),
         wanted,
@@ -163,8 +165,8 @@ pub(super) fn read(stream: &mut impl BufRead, wanted: &[u32]) -> Result<Mesh, St
         match (section.as_str(), version) {
             ("$Nodes" | "$ParametricNodes", Version::Two) => nodes_2(&mut lines, &mut nodes)?,
             ("$Nodes", Version::Four) => nodes_4(&mut lines, &mut nodes)?,
-            ("$Elements", Version::Two) => elements_2(&mut lines, &nodes, &mut tetrahedra)?,
-            ("$Elements", Version::Four) => elements_4(&mut lines, &nodes, &mut tetrahedra)?,
+            ("$Elements", Version::Two) => elements_2(&mut lines, &mut nodes, &mut tetrahedra)?,
+            ("$Elements", Version::Four) => elements_4(&mut lines, &mut nodes, &mut tetrahedra)?,
             ("$Entities" | "$PartitionedEntities", Version::Four) => entities(&mut lines, &mut tetrahedra)?,
             _ if section.starts_with('$') => skip(&mut lines)?,
             _ => return Err(lines.error("this is no section of a Gmsh file")),
@@ -398,7 +400,7 @@ fn nodes_4(lines: &mut Lines<'_, impl BufRead>, nodes: &mut Nodes) -> Result<(),
 
 fn elements_2(
     lines: &mut Lines<'_, impl BufRead>,
-    nodes: &Nodes,
+    nodes: &mut Nodes,
     tetrahedra: &mut Tetrahedra<'_>,
 ) -> Result<(), String> {
     lines.require()?;
@@ -407,14 +409,15 @@ fn elements_2(
         lines.require()?;
         // Number, type, count of labels, labels, nodes.
         let ([_, kind, labels], all) = lines.numbers::<u64, 3>()?;
-        if let Some(count) = nodes_of(kind) {
+        if let Some(element) = Kind::of(kind) {
             let first = usize::try_from(labels).unwrap_or(usize::MAX).saturating_add(3);
-            if first.saturating_add(count) != all {
-                return Err(lines.error(&format!("a tetrahedron of type {kind} must have {count} nodes")));
+            if first.saturating_add(element.nodes) != all {
+                return Err(lines.error(&format!("an element of type {kind} must have {} nodes", element.nodes)));
             }
             // The first label is the physical volume.
             let region = if labels > 0 { region(lines, lines.number_at(3)?)? } else { 0 };
-            tetrahedra.add(&nodes.element(lines, first, count)?, region);
+            let of_element = nodes.element(lines, first, element.nodes)?;
+            tetrahedra.add(element, &of_element, region, nodes);
         } else {
             *tetrahedra.others.entry(kind).or_default() += 1;
         }
@@ -426,7 +429,7 @@ fn elements_2(
 /// nodes.
 fn elements_4(
     lines: &mut Lines<'_, impl BufRead>,
-    nodes: &Nodes,
+    nodes: &mut Nodes,
     tetrahedra: &mut Tetrahedra<'_>,
 ) -> Result<(), String> {
     lines.require()?;
@@ -438,12 +441,13 @@ fn elements_4(
         let region = tetrahedra.volumes.get(&entity).copied().unwrap_or(0);
         for _ in 0..count {
             lines.require()?;
-            if let Some(count) = nodes_of(kind) {
+            if let Some(element) = Kind::of(kind) {
                 let (_, all) = lines.numbers::<u64, 1>()?;
-                if all != count + 1 {
-                    return Err(lines.error(&format!("a tetrahedron of type {kind} must have {count} nodes")));
+                if all != element.nodes + 1 {
+                    return Err(lines.error(&format!("an element of type {kind} must have {} nodes", element.nodes)));
                 }
-                tetrahedra.add(&nodes.element(lines, 1, count)?, region);
+                let of_element = nodes.element(lines, 1, element.nodes)?;
+                tetrahedra.add(element, &of_element, region, nodes);
             } else {
                 *tetrahedra.others.entry(kind).or_default() += 1;
             }

@@ -150,6 +150,7 @@ fn run(page: &Path) -> String {
             .args(["-euo", "pipefail", "-c", &command])
             .current_dir(folder.path())
             .env("PATH", &path)
+            .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
             .env_remove("DISPLAY");
         let ran = shell.output().unwrap();
         let [printed, errors] = [&ran.stdout, &ran.stderr].map(|text| String::from_utf8_lossy(text).into_owned());

@@ -30,7 +30,7 @@ fn frames_of(object: &Object, method: FrameMethod, check: impl Fn(usize, &Object
         let (displacement, velocity) = gpu.read().unwrap();
         check(frame, &twin, &displacement, &velocity);
         // Sums of some hundred terms rounded by 6e-8 each.
-        let follow = |node: usize| object.attachment.follow(node, &displacement);
+        let follow = |node: usize| object.mechanics().unwrap().attachment.follow(node, &displacement);
         let followers: Vec<DVec3> = (0..object.rest.len()).map(follow).collect();
         assert!(relative(&followers, &gpu.drawn().unwrap()) < 1e-5, "frame {frame}: what is drawn");
     }
@@ -46,9 +46,10 @@ fn relative(reference: &[DVec3], other: &[DVec3]) -> f64 {
 /// Stored and kinetic energy of the object (J).
 fn energy(object: &Object, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
     let mut force = vec![DVec3::ZERO; displacement.len()];
-    object.stiffness.apply(displacement, &mut force);
+    object.mechanics().unwrap().stiffness.apply(displacement, &mut force);
     let stored: f64 = displacement.iter().zip(&force).map(|(u, f)| u.dot(*f)).sum();
-    let kinetic: f64 = velocity.iter().zip(&object.mass).map(|(v, m)| m * v.length_squared()).sum();
+    let kinetic: f64 =
+        velocity.iter().zip(&object.mechanics().unwrap().mass).map(|(v, m)| m * v.length_squared()).sum();
     0.5 * (stored + kinetic)
 }
 
@@ -74,7 +75,7 @@ fn frames_follow_the_cpus() {
     // The surface of an elastic solid follows the nodes of its elements.
     let elastic = ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.03), inclusions: Vec::new() };
     let (_, solid, _) = load_of("sphere.toml", Some(Material::Elastic(elastic)));
-    assert!(!solid.attachment.is_identity());
+    assert!(!solid.mechanics().unwrap().attachment.is_identity());
     frames_of(&solid, FrameMethod::Inverse, |frame, twin, displacement, velocity| {
         assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
         assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
@@ -104,7 +105,7 @@ fn an_isotropic_body_binds_one_number_for_a_pair_of_nodes() {
         change(&mut scene);
         let object = Object::build(&scene.object).unwrap();
         let pairs = (object.rest.len() as u64).pow(2);
-        (object.stiffness.is_isotropic(), inverse_bytes(&object) / 4, pairs)
+        (object.mechanics().unwrap().stiffness.is_isotropic(), inverse_bytes(&object) / 4, pairs)
     };
     let (is_isotropic, numbers, pairs) = of(&|_| ());
     assert!(is_isotropic && numbers == pairs, "{numbers} numbers for {pairs} pairs");
@@ -129,7 +130,7 @@ fn the_sphere_that_ships_is_drawn_where_the_cpu_has_it() {
         });
         worst.get()
     };
-    let own = last(FrameMethod::suitable(&object));
+    let own = last(FrameMethod::suitable(object.mechanics().unwrap()));
     // Forty frames of sums of 2,562 terms, rounded by 6e-8 each.
     assert!(own < 6e-3, "{own}");
     let few = last(FrameMethod::Iterations(FrameMethod::USUAL_ITERATIONS));
@@ -183,7 +184,7 @@ fn effects_follow_the_cpus_and_leave_nothing_behind_where_they_are_not_named() {
     }
     // A load buffer for gravity and stiffening, reaches and a stage for stiffening; less without dynamics.
     let [plain, heavy, stiff, all, still] = costs[..] else { panic!("{costs:?}") };
-    let (nodes, blocks) = (object.rest.len() as u64, object.stiffness.blocks.len() as u64);
+    let (nodes, blocks) = (object.rest.len() as u64, object.mechanics().unwrap().stiffness.blocks.len() as u64);
     let beyond = |cost: haptize::gpu::FrameCost| {
         (cost.bytes - plain.bytes, cost.buffers - plain.buffers, cost.dispatches - plain.dispatches)
     };
@@ -199,7 +200,7 @@ fn on_the_gpu_too_effects_never_raise_energy_however_few_the_iterations() {
     let (_, object, _) = load("sphere.toml");
     let stiffening = StiffeningSpec { factor: 20.0, strain: 0.01 };
     let effects = GraphicsEffects { stiffening: Some(stiffening), ..GraphicsEffects::default() };
-    let law = haptize::object::Stiffening::new(&object, stiffening.factor, stiffening.strain);
+    let law = haptize::object::Stiffening::new(object.mechanics().unwrap(), stiffening.factor, stiffening.strain);
     let method = FrameMethod::Iterations(2);
     for period in [1e-3, 0.3] {
         let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
@@ -210,8 +211,9 @@ fn on_the_gpu_too_effects_never_raise_energy_however_few_the_iterations() {
             forces[60] = if pushed { DVec3::new(3.0, -5.0, 9.0) } else { DVec3::ZERO };
             update.step(&forces).unwrap();
             let (u, v) = update.read().unwrap();
-            let kinetic: f64 = v.iter().zip(&object.mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
-            let now = kinetic + law.energy(&object, &u);
+            let kinetic: f64 =
+                v.iter().zip(&object.mechanics().unwrap().mass).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+            let now = kinetic + law.energy(object.mechanics().unwrap(), &u);
             assert!(pushed || now <= before * (1.0 + 1e-6), "{period} s, frame {frame}: {now} after {before}");
             (before, greatest) = (now, greatest.max(now));
         }

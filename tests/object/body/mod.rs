@@ -61,7 +61,7 @@ fn six_volumes(object: &Object) -> f64 {
 
 fn apply(object: &Object, displacement: &[DVec3]) -> Vec<DVec3> {
     let mut force = vec![DVec3::NAN; displacement.len()];
-    object.stiffness.apply(displacement, &mut force);
+    object.mechanics().unwrap().stiffness.apply(displacement, &mut force);
     force
 }
 

@@ -1,5 +1,5 @@
 //! Rigid indenters on a clamped block, against Hertz's contact with the correction for a bonded layer (Dimitriadis et
-//! al., Biophysical Journal 82, 2002) and against the flat punch of Sneddon (1965).
+//! al., Biophysical Journal 82, 2002) and against converged solutions (`tests/references/solids_indenters.csv`).
 //!
 //! Contact is frictionless, and solved here on the compliance alone, so that the elements are tested and no contact law:
 //! forces f >= 0 along the normal at the nodes of the top, gaps g = g0 - d + C f >= 0, f g = 0.
@@ -8,8 +8,15 @@ use super::*;
 use haptize::object::Compliance;
 use std::f64::consts::PI;
 
-/// Edge of the surface where it is touched (m).
-const EDGE: f64 = 0.0025;
+/// Edges of the surface where it is touched: a quarter of the radius of contact. The side of the punch is nine of them,
+/// so that it covers the own areas of whole nodes (m).
+const EDGE: f64 = 0.0175 / 9.0;
+
+/// Size of the cubes: 0.8 of the radius of contact of the ball (m).
+const CELL: f64 = 0.006;
+
+/// How many such edges lie to either side of the middle.
+const FINE: f64 = 7.0;
 
 /// Force (N) of an indenter whose surface stands `height` above its lowest point, pressed `depth` into the block (m).
 fn pressed(object: &Object, height: impl Fn(DVec3) -> f64, depth: f64) -> f64 {
@@ -32,8 +39,13 @@ fn pressed(object: &Object, height: impl Fn(DVec3) -> f64, depth: f64) -> f64 {
     forces.iter().sum()
 }
 
+/// The block of the references; its surface is coarser away from the middle.
 fn gel(poisson: f64) -> Object {
-    solid(block([40, 40, 20], EDGE), elastic(poisson, None), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO)
+    let (mut nodes, triangles) = block([36, 36, 15], 1.0);
+    let coarse = (0.05 - FINE * EDGE) / (18.0 - FINE);
+    let across = |x: f64| x.signum() * (x.abs().min(FINE) * EDGE + (x.abs() - FINE).max(0.0) * coarse);
+    nodes.iter_mut().for_each(|node| *node = DVec3::new(across(node.x), across(node.y), node.z * (0.05 / 15.0)));
+    solid((nodes, triangles), elastic(poisson, Some(CELL)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO)
 }
 
 /// Force of a ball of `radius` pressed `depth` into a bonded layer of `thickness` (m): Dimitriadis' equation 12.
@@ -47,13 +59,43 @@ fn hertz_on_layer(poisson: f64, radius: f64, depth: f64, thickness: f64) -> f64 
     4.0 / 3.0 * YOUNG / (1.0 - poisson * poisson) * radius.sqrt() * depth.powf(1.5) * correction
 }
 
+/// The converged force of `indenter` (N).
+fn converged(indenter: &str, poisson: f64) -> f64 {
+    let text = include_str!("../../references/solids_indenters.csv");
+    let row = text.lines().find(|line| line.starts_with(&format!("{indenter},{poisson},"))).unwrap();
+    row.rsplit(',').next().unwrap().parse().unwrap()
+}
+
+/// The pressure under a sharp edge has no bound, and cubes of two thirds of the punch's half side do not follow it.
 #[test]
-fn a_ball_presses_as_hertz_says_on_a_bonded_layer() {
+fn a_ball_a_capsule_and_a_flat_punch_press_as_converged_solutions_and_hertz_say() {
+    let ball = |x: DVec3| (x.x * x.x + x.y * x.y) / 0.06;
+    let capsule = |x: DVec3| (x.x * x.x + (x.y.abs() - 0.01).max(0.0).powi(2)) / 0.06;
+    let punch = |x: DVec3| if x.x.abs().max(x.y.abs()) < 0.00875 { 0.0 } else { f64::INFINITY };
+    let indenters = [
+        ("ball", &ball as &dyn Fn(DVec3) -> f64, 0.002, 0.03),
+        ("capsule", &capsule, 0.002, 0.03),
+        ("punch", &punch, 0.001, 0.08),
+    ];
+    for poisson in [0.3, 0.45, 0.49, 0.499] {
+        let gel = gel(poisson);
+        let forces = indenters.map(|(name, height, depth, bound)| {
+            let (force, expected) = (pressed(&gel, height, depth), converged(name, poisson));
+            let error = force / expected - 1.0;
+            println!("{name}, nu {poisson}: {force:.3} N of {expected:.3} N, {:+.1} %", 100.0 * error);
+            assert!(error.abs() < bound, "{name}, nu {poisson}: {force} N instead of {expected} N");
+            force
+        });
+        // The textbook's layer is infinitely wide.
+        let closed = hertz_on_layer(poisson, 0.03, 0.002, 0.05);
+        assert!(
+            (forces[0] / closed - 1.0).abs() < 0.04,
+            "nu {poisson}: {} N instead of {closed} N by Hertz",
+            forces[0]
+        );
+    }
     for (poisson, expected) in [(0.3, 2.62), (0.45, 3.08), (0.49, 3.27)] {
         let closed = hertz_on_layer(poisson, 0.03, 0.002, 0.05);
         assert!((closed / expected - 1.0).abs() < 2e-3, "{closed} for nu {poisson}");
-        let force = pressed(&gel(poisson), |x| (x.x * x.x + x.y * x.y) / (2.0 * 0.03), 0.002);
-        println!("ball, nu {poisson}: {force:.3} N of {closed:.3} N");
-        assert!((force / closed - 1.0).abs() < 0.03, "nu {poisson}: {force} N instead of {closed} N");
     }
 }

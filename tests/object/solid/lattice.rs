@@ -36,15 +36,15 @@ fn a_uniform_strain_is_exact_and_leaves_the_inside_in_balance() {
     for poisson in [-0.5, 0.0, 0.3, 0.4999] {
         let bedded = Bedded::new([2, 3, 5], 0.02, elastic(poisson, Some(0.02)), DMat3::IDENTITY, DVec3::ZERO);
         let bar = &bedded.0[0];
-        assert_eq!(bar.moved.len(), 5 * 7 * 11);
+        assert_eq!(bar.mechanics().unwrap().moved.len(), 5 * 7 * 11);
         let expected = density(poisson) * 0.04 * 0.06 * 0.1;
         assert!((bedded.energy(strained) / expected - 1.0).abs() < 1e-10, "nu {poisson}");
-        let displacement: Vec<DVec3> = bar.moved.iter().map(|x| strained(*x)).collect();
+        let displacement: Vec<DVec3> = bar.mechanics().unwrap().moved.iter().map(|x| strained(*x)).collect();
         let inner = |x: DVec3| x.x.abs() < 0.019 && x.y.abs() < 0.029 && (0.001..0.099).contains(&x.z);
-        let scale = bar.stiffness.norm() * 1e-4;
+        let scale = bar.mechanics().unwrap().stiffness.norm() * 1e-4;
         let mut count = 0;
-        for (node, x) in bar.moved.iter().enumerate().filter(|(_, x)| inner(**x)) {
-            let force = bar.stiffness.force_on(node, &displacement);
+        for (node, x) in bar.mechanics().unwrap().moved.iter().enumerate().filter(|(_, x)| inner(**x)) {
+            let force = bar.mechanics().unwrap().stiffness.force_on(node, &displacement);
             assert!(force.length() < 1e-10 * scale, "{force} at {x}, nu {poisson}");
             count += 1;
         }
@@ -83,7 +83,7 @@ fn the_surface_follows_the_mean_over_its_own_area() {
     let ball = Shape::Icosphere { centre: DVec3::ZERO, radius: 0.05, divisions: 6 };
     let ball = Object::build(&spec(ball, elastic(0.3, None), bed(1e6))).unwrap();
     let areas = own_areas(&ball);
-    let displacement: Vec<DVec3> = ball.moved.iter().map(|x| strained(*x)).collect();
+    let displacement: Vec<DVec3> = ball.mechanics().unwrap().moved.iter().map(|x| strained(*x)).collect();
     let mut means = vec![DVec3::ZERO; ball.surface_nodes];
     for triangle in &ball.triangles {
         let places = triangle.map(|node| ball.rest[node as usize]);
@@ -100,10 +100,13 @@ fn the_surface_follows_the_mean_over_its_own_area() {
         around.map(|triangle| area(triangle.map(|node| ball.rest[node as usize])) / 3.0).sum()
     };
     for node in 0..ball.surface_nodes {
-        let sum: f64 = ball.attachment.row(node).iter().map(|(_, weight)| weight).sum();
+        let sum: f64 = ball.mechanics().unwrap().attachment.row(node).iter().map(|(_, weight)| weight).sum();
         assert!((sum - 1.0).abs() < 1e-12, "a shift moves every node alike: {sum}");
         let expected = strained(means[node] / whole(node));
-        assert!((ball.attachment.follow(node, &displacement) - expected).length() < 1e-15, "node {node}");
+        assert!(
+            (ball.mechanics().unwrap().attachment.follow(node, &displacement) - expected).length() < 1e-15,
+            "node {node}"
+        );
         assert!(areas[node].dot(ball.rest[node]) > 0.0);
     }
     let compliance = Compliance::new(&ball);
@@ -142,9 +145,16 @@ fn a_cantilever_bends_as_beam_theory_says() {
 fn nodes_share_the_mass_of_the_surface() {
     for cell in [0.03, 0.013] {
         let body = solid(block([4, 4, 4], 0.02), elastic(0.3, Some(cell)), bed(1e6), turned(), DVec3::ZERO);
-        assert!(body.mass.iter().chain(&body.damping).all(|part| *part > 0.0));
-        assert!((body.mass.iter().sum::<f64>() / (0.01 * body.rest.len() as f64) - 1.0).abs() < 1e-12);
-        assert!((body.damping.iter().sum::<f64>() / (0.1 * body.rest.len() as f64) - 1.0).abs() < 1e-12);
+        assert!(
+            body.mechanics().unwrap().mass.iter().chain(&body.mechanics().unwrap().damping).all(|part| *part > 0.0)
+        );
+        assert!(
+            (body.mechanics().unwrap().mass.iter().sum::<f64>() / (0.01 * body.rest.len() as f64) - 1.0).abs() < 1e-12
+        );
+        assert!(
+            (body.mechanics().unwrap().damping.iter().sum::<f64>() / (0.1 * body.rest.len() as f64) - 1.0).abs()
+                < 1e-12
+        );
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod bodies;
+mod cells;
 mod gmsh;
 mod indentation;
 mod lattice;
@@ -90,16 +91,16 @@ fn own_areas(object: &Object) -> Vec<DVec3> {
 
 /// Displacements of the object's nodes (m) under `forces` on them (N).
 fn displaced(object: &Object, forces: &[DVec3]) -> Vec<DVec3> {
-    let mut loads = vec![DVec3::ZERO; object.moved.len()];
-    object.attachment.spread(forces, &mut loads);
-    object.factor.solve(&mut loads);
-    (0..object.rest.len()).map(|node| object.attachment.follow(node, &loads)).collect()
+    let mut loads = vec![DVec3::ZERO; object.mechanics().unwrap().moved.len()];
+    object.mechanics().unwrap().attachment.spread(forces, &mut loads);
+    object.mechanics().unwrap().factor.solve(&mut loads);
+    (0..object.rest.len()).map(|node| object.mechanics().unwrap().attachment.follow(node, &loads)).collect()
 }
 
 /// Elastic energy under a displacement of the nodes of K (J).
 fn energy(object: &Object, u: impl Fn(DVec3) -> DVec3) -> f64 {
-    let displacement: Vec<DVec3> = object.moved.iter().map(|x| u(*x)).collect();
-    object.stiffness.energy(&displacement)
+    let displacement: Vec<DVec3> = object.mechanics().unwrap().moved.iter().map(|x| u(*x)).collect();
+    object.mechanics().unwrap().stiffness.energy(&displacement)
 }
 
 /// Turn by 30 degrees around (1, 1, 1).

@@ -23,9 +23,10 @@ fn graphics_60() -> GraphicsSpec {
 /// Kinetic and elastic energy of the object (J).
 fn energy(object: &Object, motion: &ObjectMotion<'_>) -> f64 {
     let mut force = vec![DVec3::ZERO; object.rest.len()];
-    object.stiffness.apply(motion.displacement(), &mut force);
+    object.mechanics().unwrap().stiffness.apply(motion.displacement(), &mut force);
     let elastic: f64 = force.iter().zip(motion.displacement()).map(|(f, u)| f.dot(*u)).sum();
-    let kinetic: f64 = object.mass.iter().zip(motion.velocity()).map(|(m, v)| m * v.length_squared()).sum();
+    let kinetic: f64 =
+        object.mechanics().unwrap().mass.iter().zip(motion.velocity()).map(|(m, v)| m * v.length_squared()).sum();
     0.5 * (elastic + kinetic)
 }
 
@@ -43,8 +44,12 @@ fn the_object_never_gains_energy_without_input_and_balances_with_it() {
                 let forces: Vec<DVec3> = (0..object.rest.len()).map(force).collect();
                 let v_hat = motion.step(&forces);
                 let work: f64 = period * v_hat.iter().zip(&forces).map(|(v, f)| v.dot(*f)).sum::<f64>();
-                let loss: f64 =
-                    period * v_hat.iter().zip(&object.damping).map(|(v, b)| b * v.length_squared()).sum::<f64>();
+                let loss: f64 = period
+                    * v_hat
+                        .iter()
+                        .zip(&object.mechanics().unwrap().damping)
+                        .map(|(v, b)| b * v.length_squared())
+                        .sum::<f64>();
                 let after = energy(&object, &motion);
                 let scale = before + after + work.abs() + loss;
                 assert!(
@@ -69,7 +74,7 @@ fn under_constant_forces_the_object_settles_where_its_springs_balance_them() {
         motion.step(&forces);
     }
     let mut spring = vec![DVec3::ZERO; object.rest.len()];
-    object.stiffness.apply(motion.displacement(), &mut spring);
+    object.mechanics().unwrap().stiffness.apply(motion.displacement(), &mut spring);
     let error = spring.iter().zip(&forces).map(|(k, f)| (*k - *f).length()).fold(0.0, f64::max);
     assert!(error < 1e-6, "{error}");
     assert_eq!(motion.nodes().len(), 102);
