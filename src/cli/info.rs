@@ -90,14 +90,18 @@ impl Describe for MeshInfo {
         let [low, high] = [mesh.low, mesh.high].map(|corner| vector(corner, 4));
         text.row("size", format_args!("{}, from {low} to {high}", vector(mesh.high - mesh.low, 4)));
         text.row("edges", format_args!("{:.4} long on average", mesh.mean_edge));
-        let metres = mesh.unit.metres();
-        let litres = 1e3 * mesh.volume * metres.powi(3);
-        let longest = 1e3 * metres * (mesh.high - mesh.low).max_element();
-        let (scale, unit) = (number(metres, 4), mesh.unit.name());
-        text.row(
-            "unit",
-            format_args!("{unit}, by its size: {longest:.1} mm long and {litres:.4} l with scale = {scale}"),
-        );
+        if let Some(unit) = mesh.unit {
+            let (metres, name) = (unit.metres(), unit.name());
+            let litres = 1e3 * mesh.volume * metres.powi(3);
+            let longest = 1e3 * metres * (mesh.high - mesh.low).max_element();
+            let scale = number(metres, 4);
+            text.row(
+                "unit",
+                format_args!("{name}, by its size: {longest:.1} mm long and {litres:.4} l with scale = {scale}"),
+            );
+        } else {
+            text.row("unit", "its size fits neither metres nor millimetres: give its scale by hand");
+        }
         mesh.warnings.iter().for_each(|warning| text.row("notice", escaped(warning)));
         mesh.defect.iter().for_each(|defect| text.row("defect", escaped(defect)));
     }

@@ -145,8 +145,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     files.push(ticks?);
     let trace = &played.trace;
     let path = || trace.ticks.iter().map(|tick| (tick.proxy, tick.sample.contact)).collect::<Vec<_>>();
-    // Of a dataset the bake has told it. Before the figures: the threads that draw those left out are held for good.
-    let thin_part = live.as_ref().and_then(|scene| thin_parts::on_path(scene.direct().model(), &path()));
+    // Before the figures: the threads that draw those left out are held for good.
+    let thin_part = match &live {
+        Some(scene) => thin_parts::on_path(scene.direct().model(), &path()),
+        None => thin_parts::told(&dataset.provenance.notices),
+    };
     files.extend(write(&setup, &dataset, &played, &folder)?);
     let mut felt = PlaybackReport::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(beside) = beside {
@@ -195,7 +198,7 @@ struct PlayedSession {
     device: Option<Driven>,
     /// How near arm and object come where nothing touches.
     clearance: Option<Clearance>,
-    /// What to tell of a part of the object that the arm got through, where contact was solved live.
+    /// What to tell of a part of the object that the arm got through, or gets through somewhere in the dataset.
     #[serde(skip_serializing_if = "Option::is_none")]
     thin_part: Option<String>,
     #[serde(flatten)]

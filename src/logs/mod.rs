@@ -158,6 +158,9 @@ pub fn import(
     import.finish(of_robot)
 }
 
+/// Share of the rows that may have the time of the row before (1): a driver may send each message several times.
+const MOST_REPEATED: f64 = 0.9;
+
 /// What to do where most rows cannot be used, most of them for `reason`; `of_robot`: they are messages.
 fn remedy(reason: Reason, of_robot: bool, mapping: &Mapping) -> String {
     let joints = || mapping.joints.iter().map(|joint| joint.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -340,6 +343,16 @@ impl<'a> Import<'a> {
 
     /// `of_robot`: rows are messages.
     fn finish(mut self, of_robot: bool) -> Result<Imported, Error> {
+        let repeated = self.report.dropped.iter().find(|dropped| dropped.reason == Reason::RepeatedTime);
+        if let Some(repeated) =
+            repeated.filter(|repeated| repeated.rows as f64 > MOST_REPEATED * self.report.rows as f64)
+        {
+            let (repeated, rows) = (repeated.rows, self.report.rows);
+            return Err(error!(
+                "{repeated} of {rows} rows have the time of the row before: take a column of finer time in [time], or \
+                 their distance by `period`"
+            ));
+        }
         let is_sound = |reason| matches!(reason, Reason::Absent | Reason::RepeatedTime | Reason::Outlier);
         let broken = |dropped: &&Dropped| !is_sound(dropped.reason);
         let dropped: u64 = self.report.dropped.iter().filter(broken).map(|dropped| dropped.rows).sum();

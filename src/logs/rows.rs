@@ -8,6 +8,7 @@ use super::{
 use crate::{
     Error, JointVector,
     csv::{Lines, fields},
+    names::escaped,
 };
 use std::{io::BufRead, path::Path};
 
@@ -202,7 +203,9 @@ impl<'a, R: BufRead> Rows<'a, R> {
                 let mut found = names.iter().enumerate().filter(|(_, known)| *known == name).map(|(column, _)| column);
                 match (found.next(), found.next()) {
                     (Some(column), None) => Ok(column),
-                    (None, _) => Err(self.error(format!("no column is called `{name}`; there are {}", listed(names)))),
+                    (None, _) => {
+                        Err(self.error(format!("no column is called `{}`; there are {}", escaped(name), listed(names))))
+                    }
                     (Some(first), Some(second)) => Err(self.error(format!(
                         "columns {} and {} are both called `{name}`: give the number of the one that is meant",
                         first + 1,

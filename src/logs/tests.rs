@@ -23,6 +23,21 @@ fn refused(mapping: &str, log: &str) -> String {
 }
 
 #[test]
+fn a_time_that_hardly_ever_goes_on_is_refused() {
+    let log: String = (0..100).map(|k| format!("{},{k},1\n", k / 50)).collect();
+    let why = refused(TWO, &log);
+    assert!(why.contains("98 of 100 rows have the time of the row before: take a column of finer time"), "{why}");
+    // Each row twice is what some drivers send.
+    let twice: String = (0..100).map(|k| format!("{},{k},1\n", k / 2)).collect();
+    assert_eq!(read(TWO, &twice).unwrap().0.len(), 50);
+    let forged = TWO
+        .replace("column = 2", "column = \"a\\nb: all is well\"")
+        .replace("[time]", "[table]\nheader = true\n[time]");
+    let why = refused(&forged, "t,q,tau\n1,2,3\n");
+    assert!(why.contains("no column is called `a\\u000ab: all is well`") && !why.contains('\n'), "{why}");
+}
+
+#[test]
 fn columns_are_scaled_and_named() {
     let mapping = r#"
         [table]

@@ -12,6 +12,9 @@ const ENDINGS: [&str; 4] = ["obj", "stl", "ply", "msh"];
 /// Longest body that is taken to be given in metres where no unit is named (m).
 const LONGEST: f64 = 2.0;
 
+/// Lengths of bodies that are touched (m).
+const LIKELY: std::ops::RangeInclusive<f64> = 1e-3..=LONGEST;
+
 /// A mesh file in numbers. Lengths are in the unit of the file's coordinates.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshSummary {
@@ -33,8 +36,8 @@ pub struct MeshSummary {
     pub mean_edge: f64,
     /// Volume that the surface encloses.
     pub volume: f64,
-    /// The unit that the size suggests.
-    pub unit: LengthUnit,
+    /// The unit that the size suggests, if one does.
+    pub unit: Option<LengthUnit>,
     /// What its reader says of it.
     pub warnings: Vec<String>,
     /// Why it cannot be an object, and what to do.
@@ -84,7 +87,8 @@ impl MeshSummary {
             high,
             mean_edge: topology::mean_edge(&body.nodes, &body.triangles),
             volume: enclosed(&body.nodes, &body.triangles),
-            unit: suggested(high - low),
+            unit: Some(suggested(high - low))
+                .filter(|unit| LIKELY.contains(&(unit.metres() * (high - low).max_element()))),
             warnings,
             defect,
         })

@@ -87,8 +87,10 @@ fn handed_stiffness(spec: &HapticsSpec, joint: usize) -> f64 {
 #[must_use]
 pub fn damped(spec: &HapticsSpec, source: &TorqueSource) -> HapticsSpec {
     let mut damped = spec.clone();
-    for (damping, slope) in damped.proxy_damping.iter_mut().zip(spec.boundary_slope.iter()) {
-        *damping = damping.max(slope / (spec.rate * spec.passivity_factor));
+    if !source.is_potential() {
+        for (damping, slope) in damped.proxy_damping.iter_mut().zip(spec.boundary_slope.iter()) {
+            *damping = damping.max(slope / (spec.rate * spec.passivity_factor));
+        }
     }
     let [object, both] = relative_stiffness(&damped, source);
     let ratio = object.max(both);
@@ -183,13 +185,13 @@ fn has_coupling(spec: &HapticsSpec) -> bool {
     spec.coupling_stiffness.iter().all(|stiffness| *stiffness > 0.0)
 }
 
-/// Share of the device's damping that the coupling's takes where it leaves the spring no room (1): the spring may then
-/// be two thirds as stiff as without a damper.
+/// Share of the device's damping that the coupling's takes at most where the spring has to give way (1): it may then be
+/// two thirds as stiff as without a damper.
 const DAMPER: f64 = 1.0 / 3.0;
 
 /// Returns `spec` with the gains that break a bound changed so that they keep it, and the others as they are: the
-/// proxy's damping as [`damped`] raises it, the coupling's stiffness lowered, and its damping where no stiffness would
-/// do. The changed ones have [`DIGITS`] digits. The stiffness is zero where the device allows none.
+/// proxy's damping as [`damped`] raises it; the coupling's damping lowered where that is enough, else its stiffness as
+/// well. The changed ones have [`DIGITS`] digits. The stiffness is zero where the device allows none.
 fn passive(spec: &HapticsSpec, source: &TorqueSource) -> HapticsSpec {
     let mut passive = damped(spec, source);
     for (damping, own) in passive.proxy_damping.iter_mut().zip(spec.proxy_damping.iter()) {
@@ -198,13 +200,18 @@ fn passive(spec: &HapticsSpec, source: &TorqueSource) -> HapticsSpec {
         }
     }
     for joint in 0..source.joints() {
-        if spec.coupling_stiffness[joint] <= greatest_stiffness(spec, joint) {
+        let (stiffness, damping) = (spec.coupling_stiffness[joint], spec.coupling_damping[joint]);
+        if stiffness <= greatest_stiffness(spec, joint) {
             continue;
         }
-        if greatest_stiffness(spec, joint) <= 0.0 {
-            passive.coupling_damping[joint] = at_most(DAMPER * spec.device_damping[joint]);
+        passive.coupling_damping[joint] = damping.min(at_most(DAMPER * spec.device_damping[joint]));
+        let greatest = greatest_stiffness(&passive, joint);
+        if stiffness <= greatest {
+            // The spring may stay, and the damper as much as goes with it.
+            passive.coupling_damping[joint] = damping.min(at_most(greatest_damping(spec, joint)));
+        } else {
+            passive.coupling_stiffness[joint] = at_most(greatest);
         }
-        passive.coupling_stiffness[joint] = at_most(greatest_stiffness(&passive, joint));
     }
     passive
 }
@@ -265,17 +272,20 @@ pub fn bounds(spec: &HapticsSpec, source: &TorqueSource, joints: &[JointLabel]) 
     let mut found = Vec::new();
     for (a, joint) in joints.iter().enumerate().take(source.joints()) {
         let (torque, angle) = if joint.unit == "m" { ("N", "m") } else { ("N m", "rad") };
-        let slope = greatest_slope(spec, a);
-        found.push(Bound {
-            what: format!("boundary slope Ks of joint {}", joint.name),
-            value: spec.boundary_slope[a],
-            safe: slope,
-            remedy: format!(
-                "lower Ks to {} {torque}/{angle}, or raise the proxy's damping bv to {} {torque} s/{angle}",
-                at_most(slope),
-                at_least(spec.boundary_slope[a] * period / spec.passivity_factor)
-            ),
-        });
+        // A potential has no boundary layer.
+        if !source.is_potential() {
+            let slope = greatest_slope(spec, a);
+            found.push(Bound {
+                what: format!("boundary slope Ks of joint {}", joint.name),
+                value: spec.boundary_slope[a],
+                safe: slope,
+                remedy: format!(
+                    "lower Ks to {} {torque}/{angle}, or raise the proxy's damping bv to {} {torque} s/{angle}",
+                    at_most(slope),
+                    at_least(spec.boundary_slope[a] * period / spec.passivity_factor)
+                ),
+            });
+        }
         let stiffness = spec.coupling_stiffness[a] + handed_stiffness(spec, a);
         let name =
             if spec.four_channel.is_some() { "stiffness Kvc + c2 Ks on the device" } else { "coupling stiffness Kvc" };

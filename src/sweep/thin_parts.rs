@@ -42,21 +42,35 @@ pub(super) fn notice(
     ))
 }
 
+/// Words of a notice by which a dataset tells it.
+const PASSES: &str = "passes the middle of a part of the object";
+
+/// Returns what the `notices` of a dataset tell of thin parts.
+#[must_use]
+pub fn told(notices: &[String]) -> Option<String> {
+    notices.iter().find(|notice| notice.contains(PASSES)).cloned()
+}
+
 /// Says of which part the middle is passed, and what becomes of the torque there; none where no part is.
 fn thinnest(passed: &[(PastMiddle, JointVector)]) -> Option<String> {
     let (thinnest, q) = passed.iter().min_by(|(a, _), (b, _)| a.thickness.total_cmp(&b.thickness))?;
     Some(format!(
-        "passes the middle of a part of the object, {:.1} mm thick at its thinnest, at q = [{}]: contact is with the \
+        "{PASSES}, {:.1} mm thick at its thinnest, at q = [{}]: contact is with the \
          closest surface, so the torque changes its sign in the middle and is zero beyond the part",
         1e3 * thinnest.thickness,
         q.iter().map(|q| format!("{q:.4}")).collect::<Vec<_>>().join(", ")
     ))
 }
 
+/// Steps of a path that are looked at (1): some tenths of a second, which a session that ends by a signal has. Those of
+/// a longer path are longer.
+const STEPS: usize = 20_000;
+
 /// As [`notice`], of an arm that moved along `path` in small steps, with the configurations that are in contact.
 #[must_use]
 pub fn on_path(model: &Model<'_>, path: &[(JointVector, bool)]) -> Option<String> {
-    let steps = path.par_windows(2).filter(|step| step.iter().any(|(_, touches)| *touches));
+    let path: Vec<_> = path.iter().step_by(path.len().div_ceil(STEPS).max(1)).collect();
+    let steps = path.par_windows(2).filter(|step| step.iter().any(|place| place.1));
     let looked = steps.map_init(
         || Proximity::new(model),
         |proximity, step| Some((proximity.past_middle(&step[0].0, [step[1].0])?, step[1].0)),

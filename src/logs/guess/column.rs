@@ -26,6 +26,7 @@ const OTHERS: &[&str] = &[
     "temp",
     "stress",
     "strain",
+    "des",
     "status",
     "state",
     "target",
@@ -38,8 +39,8 @@ const OTHERS: &[&str] = &[
     "error",
     "index",
 ];
-const TIMES: &[&str] = &["time", "t", "timestamp", "stamp", "clock"];
-const TORQUES: &[&str] = &["torque", "tau", "effort", "trq", "tq", "moment", "force", "f", "load", "motor"];
+const TIMES: &[&str] = &["time", "t", "timestamp", "stamp", "clock", "zeit"];
+const TORQUES: &[&str] = &["torque", "tau", "effort", "eff", "trq", "tq", "moment", "force", "f", "load", "motor"];
 const POSITIONS: &[&str] = &[
     "position",
     "pos",
@@ -92,6 +93,8 @@ pub(super) struct Reading {
     pub label: String,
     /// What is left of the name without role and unit: the joint.
     pub rest: String,
+    /// What stands in brackets and is no unit that is known.
+    pub unknown: Option<String>,
     /// Whether it says that it is something else.
     pub is_other: bool,
 }
@@ -101,6 +104,7 @@ pub(super) fn read(name: &str) -> Reading {
     let (bare, bracketed) = split_brackets(name);
     let mut words = words(bare);
     let mut unit = bracketed.and_then(unit_of);
+    let unknown = bracketed.filter(|text| unit.is_none() && text.chars().any(char::is_alphabetic)).map(str::to_owned);
     if unit.is_none()
         && let Some(last) = words.last()
         // One letter is a name as well.
@@ -114,11 +118,10 @@ pub(super) fn read(name: &str) -> Reading {
     let is_other = words.iter().any(|word| OTHERS.contains(&word.as_str()));
     let mut role = None;
     for (words_of, of) in [(TORQUES, Role::Torque), (TIMES, Role::Time), (POSITIONS, Role::Position)] {
-        if role.is_none()
-            && let Some(at) = words.iter().position(|word| words_of.contains(&word.as_str()))
-        {
+        let is_one = |word: &String| words_of.contains(&word.as_str());
+        if role.is_none() && words.iter().any(is_one) {
             role = Some(of);
-            words.remove(at);
+            words.retain(|word| !is_one(word));
         }
     }
     let by_unit = unit.map(|unit| match unit.in_si().1 {
@@ -127,7 +130,7 @@ pub(super) fn read(name: &str) -> Reading {
         _ => Role::Torque,
     });
     let role = if is_other { None } else { by_unit.or(role) };
-    Reading { role, unit, label, rest: words.join(" "), is_other }
+    Reading { role, unit, label, rest: words.join(" "), unknown, is_other }
 }
 
 /// Splits what stands in brackets from a name.

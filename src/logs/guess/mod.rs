@@ -37,6 +37,12 @@ const TO_AND_FRO: f64 = 0.2;
 /// Share of the rows at which the time is later than at the row before (1): stamps may be rounded.
 const GROWING: f64 = 0.9;
 
+/// Share of the rows at which a column that is called the time has to grow (1): one of whole seconds hardly does.
+const RISING: f64 = 0.5;
+
+/// Time between rows where no column tells it (s).
+const PERIOD: f64 = 1e-3;
+
 /// Angle that no joint in radians is at (rad): three turns.
 const GREATEST_ANGLE: f64 = 3.0 * TAU;
 
@@ -66,6 +72,8 @@ struct Joint {
     name: String,
     position: Quantity,
     torque: Quantity,
+    /// Whether the name of the torque's column says that it is the motor's.
+    of_motor: bool,
 }
 
 /// Guesses what the columns of the table in `log` are.
@@ -97,9 +105,22 @@ pub fn guess(log: &Path) -> Result<GuessedMapping, Error> {
     }
     let pairs = pairs(&readings, &positions, &torques, &mut doubts);
     let joints: Vec<Joint> = pairs.into_iter().map(|pair| joint(&layout, &readings, pair, &mut doubts)).collect();
+    let (joints, still): (Vec<Joint>, Vec<Joint>) =
+        joints.into_iter().partition(|joint| range(&joint.position.values).is_some_and(|[low, high]| high > low));
+    if !still.is_empty() {
+        let names: Vec<&str> = still.iter().map(|joint| joint.name.as_str()).collect();
+        doubts.push(format!("joints that do not move are left out: {}", names.join(", ")));
+    }
+    if joints.is_empty() {
+        return Err(Error::at(log, format_args!("no joint moves in its rows: {}", described(&layout))));
+    }
     let mut known = HashSet::new();
     let named = joints.iter().all(|joint| known.insert(joint.name.as_str()));
-    let time = times.first().map(|&column| time(&layout, &readings, column, &mut doubts));
+    let rising = times.iter().find(|column| rises(&layout.columns[**column]) >= RISING);
+    let time = rising.map(|column| time(&layout, &readings, *column, &mut doubts));
+    if time.is_none() {
+        doubts.push("no column is the time: rows are taken to be 1 ms apart".to_owned());
+    }
     let facts = Facts { layout: &layout, time, joints, named, effort: Effort::Contact, average: None };
     Ok(facts.complete(log, doubts))
 }
@@ -116,9 +137,8 @@ fn unnamed(layout: &Layout, doubts: &mut Vec<String>) -> Vec<Reading> {
     let mut readings = vec![of(None); layout.columns.len()];
     let mut others: Vec<usize> = (0..layout.columns.len()).filter(|&column| layout.is_numeric[column]).collect();
     let grows = |column: &usize| {
-        let steps = || layout.columns[*column].windows(2).map(|pair| pair[1] - pair[0]);
-        let up = steps().filter(|step| *step > 0.0).count() as f64;
-        up >= GROWING * steps().count() as f64 && steps().all(|step| step >= 0.0)
+        let values = &layout.columns[*column];
+        rises(values) >= GROWING && values.windows(2).all(|pair| pair[1] >= pair[0])
     };
     if let Some(at) = others.iter().position(grows) {
         readings[others.remove(at)] = of(Some(Role::Time));
@@ -132,6 +152,12 @@ fn unnamed(layout: &Layout, doubts: &mut Vec<String>) -> Vec<Reading> {
         described(layout)
     ));
     readings
+}
+
+/// Share of the rows at which a column is greater than at the row before (1).
+fn rises(values: &[f64]) -> f64 {
+    let up = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
+    up as f64 / values.len().saturating_sub(1).max(1) as f64
 }
 
 /// The columns with their ranges, for messages.
@@ -166,16 +192,23 @@ fn pairs(
         let mut found = torques.iter().filter(|torque| readings[**torque].rest == readings[*position].rest);
         found.next().filter(|_| found.next().is_none()).map(|torque| (*position, *torque))
     };
-    let by_name: Vec<(usize, usize)> = positions.iter().filter_map(same).collect();
-    let distinct: HashSet<usize> = by_name.iter().map(|pair| pair.1).collect();
-    let mut pairs = if by_name.is_empty() || distinct.len() < by_name.len() {
-        if positions.len() > 1 {
-            doubts.push("the torques are given to the positions in their order".to_owned());
-        }
-        positions.iter().copied().zip(torques.iter().copied()).collect()
-    } else {
-        by_name
+    let mut pairs: Vec<(usize, usize)> = positions.iter().filter_map(same).collect();
+    let distinct: HashSet<usize> = pairs.iter().map(|pair| pair.1).collect();
+    if distinct.len() < pairs.len() {
+        pairs.clear();
+    }
+    let others = |all: &[usize], taken: Vec<usize>| -> Vec<usize> {
+        all.iter().copied().filter(|column| !taken.contains(column)).collect()
     };
+    let [left_positions, left_torques] = [
+        others(positions, pairs.iter().map(|pair| pair.0).collect()),
+        others(torques, pairs.iter().map(|pair| pair.1).collect()),
+    ];
+    if left_positions.len().min(left_torques.len()) > 0 && positions.len() > 1 {
+        doubts.push("torques are given to positions in their order where no name tells".to_owned());
+    }
+    pairs.extend(left_positions.into_iter().zip(left_torques));
+    pairs.sort_unstable();
     let left = positions.len().max(torques.len()) - pairs.len().min(MAX_AXES);
     if left > 0 {
         doubts.push(format!("{left} more columns of positions or torques are left out"));
@@ -193,6 +226,13 @@ fn joint(layout: &Layout, readings: &[Reading], pair: (usize, usize), doubts: &m
         rest => csv::plain(rest),
     };
     let turns = range(&layout.columns[position]).is_some_and(|[low, high]| high.max(-low) > GREATEST_ANGLE);
+    for column in [position, torque] {
+        if let Some(unknown) = &readings[column].unknown {
+            let what = "which is none that is known: give its factor to SI by `scale`, and no `unit`";
+            doubts.push(format!("{name}: the name of column {} says {}, {what}", column + 1, escaped(unknown)));
+        }
+    }
+    let turns = turns && readings[position].unknown.is_none();
     let unit = readings[position].unit.or_else(|| {
         let unit = if turns { ColumnUnit::Degree } else { ColumnUnit::Radian };
         doubts.push(format!("{name}: the position is taken to be in {}", unit.name()));
@@ -213,7 +253,8 @@ fn joint(layout: &Layout, readings: &[Reading], pair: (usize, usize), doubts: &m
         let factor = unit.map_or(1.0, |unit| unit.in_si().0);
         Quantity { column, unit, values: layout.columns[column].iter().map(|value| factor * value).collect() }
     };
-    Joint { position: quantity(position, unit), torque: quantity(torque, unit_of_torque), name }
+    let of_motor = readings[torque].label.contains("motor");
+    Joint { position: quantity(position, unit), torque: quantity(torque, unit_of_torque), of_motor, name }
 }
 
 /// The column of time, in seconds.
@@ -254,16 +295,24 @@ impl Facts<'_> {
             .map(|joint| range(&joint.position.values).map_or(0.0, |[low, high]| high - low))
             .collect();
         let pulls = pull(self.joints.iter().map(|joint| (&joint.position.values[..], &joint.torque.values[..])));
-        if pulls > 0.0 {
+        let is_named = self.joints.iter().any(|joint| joint.of_motor);
+        if pulls > 0.0 || is_named {
             self.effort = Effort::Motor;
         }
         doubts.push(match self.effort {
+            Effort::Motor if pulls <= 0.0 => {
+                "the torque is taken to be the motor's, as its name says, though it does not grow on the way in"
+                    .to_owned()
+            }
             Effort::Motor => {
                 "the torque is taken to be the motor's, which balances the contact: it grows on the way in; \
                               if it is the contact's own, the object would pull"
                     .to_owned()
             }
-            Effort::Contact => "the torque is taken to be the contact's own: it pushes the arm back".to_owned(),
+            Effort::Contact if pulls < 0.0 => {
+                "the torque is taken to be the contact's own: it pushes the arm back".to_owned()
+            }
+            Effort::Contact => "nothing tells whether the torque is the contact's own or the motor's".to_owned(),
         });
         doubts.push("torques must not contain the weight of the arm".to_owned());
         self.average = self.to_and_fro().map(|still| (still, ranges.iter().map(|range| range / CELLS).collect()));
@@ -282,10 +331,10 @@ impl Facts<'_> {
 
     /// Speed below which the first joint stands still, where it goes to and fro.
     fn to_and_fro(&self) -> Option<f64> {
-        let time = self.time.as_ref()?;
-        let steps = self.joints[0].position.values.windows(2).zip(time.values.windows(2));
-        let speeds: Vec<f64> =
-            steps.map(|(q, t)| (q[1] - q[0]) / (t[1] - t[0])).filter(|speed| speed.is_finite()).collect();
+        let passed = |row: usize| self.time.as_ref().map_or(PERIOD, |time| time.values[row + 1] - time.values[row]);
+        let steps = self.joints[0].position.values.windows(2).enumerate();
+        let speeds = steps.map(|(row, q)| (q[1] - q[0]) / passed(row)).filter(|speed| speed.is_finite());
+        let speeds: Vec<f64> = speeds.collect();
         let greatest = speeds.iter().fold(0.0, |greatest: f64, speed| greatest.max(speed.abs()));
         let still = STILL * greatest;
         let [up, down] = [1.0, -1.0].map(|sign| speeds.iter().filter(|speed| sign * **speed > still).count());
@@ -316,9 +365,9 @@ impl Facts<'_> {
                 writeln!(text, "column = {}", column(time.column))?;
                 time.unit.iter().try_for_each(|unit| writeln!(text, "unit = {}", quoted(unit.name())))?;
             }
-            None => writeln!(text, "period = 0.001    # no column is the time: this is a guess [s]")?,
+            None => writeln!(text, "period = {PERIOD}    # [s]")?,
         }
-        for Joint { name, position, torque } in joints {
+        for Joint { name, position, torque, .. } in joints {
             writeln!(text, "\n[[joint]]\nname = {}", quoted(name))?;
             for (key, quantity) in [("position", position), ("torque", torque)] {
                 let [low, high] = range(&layout.columns[quantity.column]).unwrap_or_default().map(coarse);
@@ -440,6 +489,38 @@ mod tests {
         assert_eq!(import(&mapping, &[file], &mut |_| ()).unwrap().samples.len(), 50, "the short row is dropped");
     }
 
+    /// What is guessed of the table with this `head`, each row of which `row` writes.
+    fn guessed(head: &str, row: impl Fn(usize) -> String) -> GuessedMapping {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("log.csv");
+        std::fs::write(&file, format!("{head}\n{}", (0..200).map(|k| row(k) + "\n").collect::<String>())).unwrap();
+        guess(&file).unwrap()
+    }
+
+    #[test]
+    fn what_the_names_contradict_or_no_row_tells_is_said() {
+        let q = |k: usize| (TAU * k as f64 / 100.0).sin();
+        let told = |guessed: &GuessedMapping, what: &str| guessed.doubts.iter().any(|doubt| doubt.contains(what));
+        let unknown = guessed("t [s],q [mrad],tau [ozf in]", |k| format!("0.{k:03},{},{}", 400.0 * q(k), -q(k)));
+        assert!(told(&unknown, "column 2 says mrad, which is none") && told(&unknown, "column 3 says ozf in"));
+        assert!(unknown.text.contains("column = \"q [mrad]\", unit = \"rad\""), "{}", unknown.text);
+        // Whole seconds beside their fractions; a joint that stands; a torque that drops out; the motor's by its name.
+        let seconds = guessed("sec,nanosec,q,q2,tau_motor,tau2", |k| {
+            let torque = if k % 5 == 0 { String::new() } else { (-q(k)).to_string() };
+            format!("{},{},{},0.5,{torque},0", k / 100, k % 100 * 10_000_000, q(k))
+        });
+        assert!(told(&seconds, "no column is the time") && seconds.text.contains("period = 0.001"));
+        assert!(
+            told(&seconds, "do not move are left out: joint 2") && seconds.steps.len() == 1,
+            "{:?}",
+            seconds.doubts
+        );
+        assert!(told(&seconds, "as its name says, though") && seconds.text.contains("keep = \"average\""));
+        assert!(seconds.text.contains("bad_rows = \"drop\""), "{}", seconds.text);
+        let free = guessed("t,q,tau,q_des", |k| format!("0.{k:03},{},0,9", q(k)));
+        assert!(told(&free, "nothing tells whether the torque is") && free.steps.len() == 1);
+    }
+
     #[test]
     fn a_log_of_which_nothing_can_be_guessed_is_refused_with_its_columns() {
         let folder = tempfile::tempdir().unwrap();
@@ -449,6 +530,7 @@ mod tests {
             ("time,angle\n1,2\n2,3\n", "a joint's torque: column 1 `time` from 1.0 to 2.0, column 2 `angle`"),
             ("<html>\n<body>\n", "no table of numbers"),
             ("", "no table of numbers"),
+            ("t,q,tau\n1,2,3\n2,2,3\n", "no joint moves in its rows"),
         ] {
             std::fs::write(&file, text).unwrap();
             let error = guess(&file).unwrap_err().to_string();

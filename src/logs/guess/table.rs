@@ -13,8 +13,9 @@ const LINES: usize = 20_000;
 /// Longest file of which the first lines are read (bytes).
 const LARGEST: u64 = u64::MAX;
 
-/// Share of a column's fields that must be numbers for it to be one (1): a table may have bad rows.
-const NUMERIC: f64 = 0.9;
+/// Share of a column's fields that must be numbers for it to be one (1), and of the rows that must be whole: a sensor may
+/// drop out.
+const NUMERIC: f64 = 0.5;
 
 /// Delimiters and decimal marks that are tried. Where several fit alike, the first is taken.
 const LAYOUTS: [(char, char); 7] =
@@ -50,6 +51,10 @@ impl Layout {
         while texts.len() < LINES
             && let Some(text) = lines.next(&mut line)?
         {
+            if texts.is_empty() && std::str::from_utf8(text).is_err() {
+                let what = "the line is not UTF-8: convert the file, for example by `iconv -f CP1252 -t UTF-8 FILE`";
+                return Err(lines.error(what));
+            }
             let text = String::from_utf8_lossy(text).trim_end().to_owned();
             if !text.is_empty() {
                 texts.push(text);

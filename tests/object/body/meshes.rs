@@ -75,7 +75,7 @@ fn a_mesh_is_summed_up_before_it_is_an_object() {
     let mean = (24.0 * 2.0 + 12.0 * 8.0_f64.sqrt()) / 36.0;
     assert!((cube.volume - 8.0).abs() < 1e-12 && (cube.mean_edge - mean).abs() < 1e-12);
     let organ = MeshSummary::read(&dataset("organ.obj")).unwrap();
-    assert_eq!((cube.unit, organ.unit), (LengthUnit::M, LengthUnit::Mm));
+    assert_eq!((cube.unit, organ.unit), (Some(LengthUnit::M), Some(LengthUnit::Mm)));
     let (nodes, faces) = prism(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0);
     let folder = tempfile::tempdir().unwrap();
     let open = folder.path().join("open.obj");

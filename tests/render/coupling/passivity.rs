@@ -216,6 +216,14 @@ fn gains_that_are_advised_are_passive() {
         let mut made = setup(&spec).unwrap();
         let changes = made.make_passive(&block(&spec)).unwrap();
         assert!(made.exceeded.is_empty() && made.advice.is_none(), "{spec}: {changes:?}");
+        let own = setup(&spec).unwrap().scene.haptics;
+        for (made, own) in [
+            (&made.scene.haptics.coupling_stiffness, &own.coupling_stiffness),
+            (&made.scene.haptics.coupling_damping, &own.coupling_damping),
+            (&own.proxy_damping, &made.scene.haptics.proxy_damping),
+        ] {
+            assert!(made.iter().zip(own.iter()).all(|(made, own)| made <= own), "{spec}: {changes:?}");
+        }
         // What the scene would have: the same gains, and nothing that was passive is changed.
         let mut written = gains.clone();
         written.extend(
