@@ -204,7 +204,10 @@ fn passive(spec: &HapticsSpec, source: &TorqueSource) -> HapticsSpec {
         if stiffness <= greatest_stiffness(spec, joint) {
             continue;
         }
-        passive.coupling_damping[joint] = damping.min(at_most(DAMPER * spec.device_damping[joint]));
+        let least = DAMPER * spec.device_damping[joint];
+        if damping > least * (1.0 + ADVICE_ROUNDING) {
+            passive.coupling_damping[joint] = at_most(least);
+        }
         let greatest = greatest_stiffness(&passive, joint);
         if stiffness <= greatest {
             // The spring may stay, and the damper as much as goes with it.
