@@ -228,7 +228,7 @@ fn frames(context: &Arc<Context>, scene: &Scene, rings: usize, adapter: Adapter)
     }
     let object = Object::build(&spec)?;
     let nodes = object.rest.len();
-    let method = FrameMethod::suitable(object.mechanics().unwrap());
+    let method = FrameMethod::suitable(object.mechanics()?);
     let forces: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
     let mut update = FrameUpdate::new(Arc::clone(context), &object, 1.0 / 60.0, method, &GraphicsEffects::default())?;
     update.step(&forces)?;
@@ -242,8 +242,7 @@ fn frames(context: &Arc<Context>, scene: &Scene, rings: usize, adapter: Adapter)
     let seconds = begin.elapsed().as_secs_f64();
     println!("\nframe update, {nodes} nodes, {method:?}: {FRAMES} frames");
     // A block of three by three times a vector, for each of a row; the rest is some operations a node.
-    let (product, blocks, square) =
-        (18.0, object.mechanics().unwrap().stiffness.blocks.len() as f64, (nodes * nodes) as f64);
+    let (product, blocks, square) = (18.0, object.mechanics()?.stiffness.blocks.len() as f64, (nodes * nodes) as f64);
     let operations = BTreeMap::from([
         ("frame load", product * blocks),
         ("frame advance", product * square),

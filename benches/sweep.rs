@@ -144,7 +144,7 @@ fn peer(root: &Path, scene: &Scene, processes: usize) -> Result<Peer, Box<dyn Er
     let grid = grid(scene, 1);
     let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
     for node in 0..object.rest.len() {
-        for (other, block) in object.mechanics().unwrap().stiffness.row(node) {
+        for (other, block) in object.mechanics()?.stiffness.row(node) {
             for a in 0..3 {
                 for b in 0..3 {
                     rows.push(3 * node + a);
