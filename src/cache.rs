@@ -46,7 +46,7 @@ impl Cache {
     pub fn of_user(note: fn(&Error)) -> Option<Self> {
         use etcetera::BaseStrategy;
         let folder = etcetera::base_strategy::choose_native_strategy().ok()?.cache_dir().join("haptize");
-        // A program that was compiled anew bears the same version, and may compute something else.
+        // A program that was compiled again bears the same version, and may compute something else.
         let file = fs::metadata(std::env::current_exe().ok()?).ok()?;
         let written = file.modified().ok()?.duration_since(SystemTime::UNIX_EPOCH).ok()?;
         let program = format!("{} {} {}", env!("CARGO_PKG_VERSION"), file.len(), written.as_nanos()).into();
@@ -79,7 +79,7 @@ impl Cache {
         file.read_to_end(&mut bytes).ok()?;
         let value = bytes.len().saturating_sub(size_of::<u32>());
         if found != start || checksum(&start, &bytes[..value]) != bytes[value..] {
-            (self.note)(&Error::at(&path, "what is kept here is damaged; it is computed and written anew"));
+            (self.note)(&Error::at(&path, "what is kept here is damaged; it is computed and written again"));
             return None;
         }
         bytes.truncate(value);
