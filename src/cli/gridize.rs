@@ -17,7 +17,7 @@ use crate::{
         prediction::{Prediction, held_out, predict},
     },
     input,
-    logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, draws, import, total_size},
+    logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
     proxy::Chain,
     report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
@@ -394,7 +394,7 @@ fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let imported = import(mapping, logs, &mut progress);
     bar.finish();
     let Imported { samples, branches, histories, report } = imported?;
-    if draws(&samples) {
+    if samples.draw_on() {
         tell(format_args!(
             "haptize: note: the torques draw the arm on where an object pushes it back: if they are the motors', say \
              effort = \"motor\" in [torque] of the mapping, or --effort; if they hold the weight of the arm, take it off"

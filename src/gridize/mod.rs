@@ -33,6 +33,7 @@ pub use cells::{Branches, CellReport, Cells, LeadDirection};
 pub use friction::{Reversals, gridize_sliding};
 pub use memory::{ForceHistory, Past, gridize_remembering, predict_histories};
 pub use samples::Samples;
+pub(crate) use samples::pull;
 
 use crate::{
     Error, MAX_AXES,

@@ -28,6 +28,18 @@ impl Samples {
         self.configurations.is_empty()
     }
 
+    /// Whether the torques draw the arm on where those of an object push it back.
+    #[must_use]
+    pub fn draw_on(&self) -> bool {
+        let of = |values: &[f64], joint: usize| -> Vec<f64> {
+            values.iter().skip(joint).step_by(self.joints.len()).copied().collect()
+        };
+        let joints =
+            (0..self.joints.len()).map(|joint| [&self.configurations, &self.torques].map(|all| of(all, joint)));
+        let joints: Vec<_> = joints.collect();
+        pull(joints.iter().map(|[positions, torques]| (&positions[..], &torques[..]))) > 0.0
+    }
+
     /// The samples in two: most, and a `share` chosen by chance, the same ones in every run.
     #[must_use]
     pub fn split(&self, share: f64) -> (Self, Self) {
@@ -82,4 +94,17 @@ impl Samples {
         }
         Ok(())
     }
+}
+
+/// Mean over the rows of (q - mean q) tau, summed over the joints (J): negative where a torque pushes an arm back, the
+/// more the farther it goes, and positive where it draws it on. Each joint has its positions (rad or m) and torques (N m
+/// or N); rows without a number are left out.
+pub(crate) fn pull<'a>(joints: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> f64 {
+    let of = |(positions, torques): (&[f64], &[f64])| {
+        let rows = || positions.iter().zip(torques).filter(|(q, torque)| q.is_finite() && torque.is_finite());
+        let count = rows().count().max(1) as f64;
+        let mean = rows().map(|(q, _)| q).sum::<f64>() / count;
+        rows().map(|(q, torque)| (q - mean) * torque).sum::<f64>() / count
+    };
+    joints.map(of).sum()
 }

@@ -62,10 +62,8 @@ impl MeshSummary {
         let mut body = if is_volume {
             import::read_tetrahedra(file, &Placement::METRES, &[], &mut warnings)?
         } else {
-            Body::shell(import::read(file, &Placement::METRES, &mut warnings)?)
+            Body::shell(import::read_of_any_size(file, &Placement::METRES, &mut warnings)?)
         };
-        // Of a length in metres; the unit below says what it may be.
-        warnings.retain(|warning| !warning.contains("scale = 0.001"));
         let surface = &body.nodes[..body.surface_nodes];
         let closed = topology::close(surface, &mut body.triangles);
         let parts = closed.as_ref().map_or(0, |closed| closed.components.len());

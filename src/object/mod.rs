@@ -131,7 +131,9 @@ impl Object {
                     InclusionPlace::Sphere { .. } => None,
                 };
                 let wanted: Vec<u32> = inclusions.iter().filter_map(region).collect();
-                import::read_tetrahedra(file, placement, &wanted, &mut warnings)?
+                let body = import::read_tetrahedra(file, placement, &wanted, &mut warnings)?;
+                warnings.extend(import::oversize(file, placement, &body.nodes));
+                body
             }
         };
         Self::assemble(spec, body, warnings)

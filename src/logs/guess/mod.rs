@@ -7,7 +7,7 @@ mod table;
 use super::{ColumnUnit, Effort};
 use crate::{
     Error, MAX_AXES, csv,
-    gridize::Samples,
+    gridize::pull,
     names::escaped,
     toml_text::{coarse, comment, list},
 };
@@ -61,17 +61,17 @@ pub struct GuessedMapping {
 }
 
 /// A column that is a quantity.
-struct Quantity {
+struct GuessedColumn {
     column: usize,
     unit: Option<ColumnUnit>,
     /// In SI units.
     values: Vec<f64>,
 }
 
-struct Joint {
+struct GuessedJoint {
     name: String,
-    position: Quantity,
-    torque: Quantity,
+    position: GuessedColumn,
+    torque: GuessedColumn,
     /// Whether the name of the torque's column says that it is the motor's.
     of_motor: bool,
 }
@@ -104,8 +104,9 @@ pub fn guess(log: &Path) -> Result<GuessedMapping, Error> {
         ));
     }
     let pairs = pairs(&readings, &positions, &torques, &mut doubts);
-    let joints: Vec<Joint> = pairs.into_iter().map(|pair| joint(&layout, &readings, pair, &mut doubts)).collect();
-    let (joints, still): (Vec<Joint>, Vec<Joint>) =
+    let joints: Vec<GuessedJoint> =
+        pairs.into_iter().map(|pair| joint(&layout, &readings, pair, &mut doubts)).collect();
+    let (joints, still): (Vec<GuessedJoint>, Vec<GuessedJoint>) =
         joints.into_iter().partition(|joint| range(&joint.position.values).is_some_and(|[low, high]| high > low));
     if !still.is_empty() {
         let names: Vec<&str> = still.iter().map(|joint| joint.name.as_str()).collect();
@@ -121,7 +122,7 @@ pub fn guess(log: &Path) -> Result<GuessedMapping, Error> {
     if time.is_none() {
         doubts.push("no column is the time: rows are taken to be 1 ms apart".to_owned());
     }
-    let facts = Facts { layout: &layout, time, joints, named, effort: Effort::Contact, average: None };
+    let facts = MappingFacts { layout: &layout, time, joints, named, effort: Effort::Contact, average: None };
     Ok(facts.complete(log, doubts))
 }
 
@@ -217,7 +218,7 @@ fn pairs(
     pairs
 }
 
-fn joint(layout: &Layout, readings: &[Reading], pair: (usize, usize), doubts: &mut Vec<String>) -> Joint {
+fn joint(layout: &Layout, readings: &[Reading], pair: (usize, usize), doubts: &mut Vec<String>) -> GuessedJoint {
     let (position, torque) = pair;
     let rests = [position, torque].map(|column| readings[column].rest.as_str());
     let name = match rests.into_iter().find(|rest| !rest.is_empty()).unwrap_or(&readings[position].label) {
@@ -251,14 +252,14 @@ fn joint(layout: &Layout, readings: &[Reading], pair: (usize, usize), doubts: &m
     }
     let quantity = |column: usize, unit: Option<ColumnUnit>| {
         let factor = unit.map_or(1.0, |unit| unit.in_si().0);
-        Quantity { column, unit, values: layout.columns[column].iter().map(|value| factor * value).collect() }
+        GuessedColumn { column, unit, values: layout.columns[column].iter().map(|value| factor * value).collect() }
     };
     let of_motor = readings[torque].label.contains("motor");
-    Joint { position: quantity(position, unit), torque: quantity(torque, unit_of_torque), of_motor, name }
+    GuessedJoint { position: quantity(position, unit), torque: quantity(torque, unit_of_torque), of_motor, name }
 }
 
 /// The column of time, in seconds.
-fn time(layout: &Layout, readings: &[Reading], column: usize, doubts: &mut Vec<String>) -> Quantity {
+fn time(layout: &Layout, readings: &[Reading], column: usize, doubts: &mut Vec<String>) -> GuessedColumn {
     let values = &layout.columns[column];
     let unit = readings[column].unit.or_else(|| {
         let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
@@ -269,14 +270,14 @@ fn time(layout: &Layout, readings: &[Reading], column: usize, doubts: &mut Vec<S
         Some(unit)
     });
     let factor = unit.map_or(1.0, |unit| unit.in_si().0);
-    Quantity { column, unit, values: values.iter().map(|value| factor * value).collect() }
+    GuessedColumn { column, unit, values: values.iter().map(|value| factor * value).collect() }
 }
 
 /// What is written.
-struct Facts<'a> {
+struct MappingFacts<'a> {
     layout: &'a Layout,
-    time: Option<Quantity>,
-    joints: Vec<Joint>,
+    time: Option<GuessedColumn>,
+    joints: Vec<GuessedJoint>,
     /// Whether no two joints have one name.
     named: bool,
     effort: Effort,
@@ -284,7 +285,7 @@ struct Facts<'a> {
     average: Option<(f64, Vec<f64>)>,
 }
 
-impl Facts<'_> {
+impl MappingFacts<'_> {
     fn complete(mut self, log: &Path, mut doubts: Vec<String>) -> GuessedMapping {
         if !self.named {
             self.joints.iter_mut().enumerate().for_each(|(k, joint)| joint.name = format!("joint {}", k + 1));
@@ -367,7 +368,7 @@ impl Facts<'_> {
             }
             None => writeln!(text, "period = {PERIOD}    # [s]")?,
         }
-        for Joint { name, position, torque, .. } in joints {
+        for GuessedJoint { name, position, torque, .. } in joints {
             writeln!(text, "\n[[joint]]\nname = {}", quoted(name))?;
             for (key, quantity) in [("position", position), ("torque", torque)] {
                 let [low, high] = range(&layout.columns[quantity.column]).unwrap_or_default().map(coarse);
@@ -383,29 +384,6 @@ impl Facts<'_> {
         }
         Ok(())
     }
-}
-
-/// Whether the torques of `samples` draw the arm on where they should push it back.
-#[must_use]
-pub fn draws(samples: &Samples) -> bool {
-    let d = samples.joints.len();
-    let of = |values: &[f64], joint: usize| values.iter().skip(joint).step_by(d).copied().collect::<Vec<_>>();
-    let joints: Vec<_> =
-        (0..d).map(|joint| (of(&samples.configurations, joint), of(&samples.torques, joint))).collect();
-    pull(joints.iter().map(|(positions, torques)| (&positions[..], &torques[..]))) > 0.0
-}
-
-/// Mean over the rows of (q - mean q) tau, summed over the joints (J): negative where a torque pushes an arm back, the
-/// more the farther it goes, and positive where it draws it on. Each joint has its positions (rad or m) and torques (N m
-/// or N); rows without a number are left out.
-fn pull<'a>(joints: impl Iterator<Item = (&'a [f64], &'a [f64])>) -> f64 {
-    let of = |(positions, torques): (&[f64], &[f64])| {
-        let rows = || positions.iter().zip(torques).filter(|(q, torque)| q.is_finite() && torque.is_finite());
-        let count = rows().count().max(1) as f64;
-        let mean = rows().map(|(q, _)| q).sum::<f64>() / count;
-        rows().map(|(q, torque)| (q - mean) * torque).sum::<f64>() / count
-    };
-    joints.map(of).sum()
 }
 
 #[cfg(test)]

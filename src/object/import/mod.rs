@@ -32,8 +32,19 @@ type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 /// Longest mesh file that is read (B): an object whose compliance fits in memory has less than a hundredth of that.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// Reads the surface in `file`; merged nodes are reported in `warnings`.
+/// Reads the surface in `file`; merged nodes are reported in `warnings`, and a scale that seems to be forgotten.
 pub(crate) fn read(file: &Path, placement: &Placement, warnings: &mut Vec<String>) -> Result<Surface, Error> {
+    let surface = read_of_any_size(file, placement, warnings)?;
+    warnings.extend(oversize(file, placement, &surface.0));
+    Ok(surface)
+}
+
+/// As [`read`], of a file whose unit is not known.
+pub(super) fn read_of_any_size(
+    file: &Path,
+    placement: &Placement,
+    warnings: &mut Vec<String>,
+) -> Result<Surface, Error> {
     check_scale(placement)?;
     let unreadable = |reason: String| unreadable(file, &reason);
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -58,9 +69,7 @@ pub(crate) fn read(file: &Path, placement: &Placement, warnings: &mut Vec<String
         let (file, dropped) = (file.display(), faces - triangles.len());
         warnings.push(format!("{file}: {dropped} of {faces} faces had two corners in one place and were left out"));
     }
-    let nodes = placement.place(nodes);
-    warnings.extend(oversize(file, placement, &nodes));
-    Ok((nodes, triangles))
+    Ok((placement.place(nodes), triangles))
 }
 
 /// Reads the tetrahedra in a Gmsh file. `wanted`: the physical volumes that the scene names, in its order.
@@ -74,7 +83,6 @@ pub(super) fn read_tetrahedra(
     let unreadable = |reason: String| unreadable(file, &reason);
     let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
     let nodes = placement.place(mesh.nodes);
-    warnings.extend(oversize(file, placement, &nodes));
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra, mesh.mid_nodes);
     let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
@@ -102,7 +110,7 @@ fn check_scale(placement: &Placement) -> Result<(), Error> {
 }
 
 /// A warning where the scale was forgotten.
-fn oversize(file: &Path, Placement { scale, .. }: &Placement, nodes: &[DVec3]) -> Option<String> {
+pub(super) fn oversize(file: &Path, Placement { scale, .. }: &Placement, nodes: &[DVec3]) -> Option<String> {
     let length = length(nodes);
     (length > MOST_METRES).then(|| {
         format!(
