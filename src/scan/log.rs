@@ -262,7 +262,8 @@ impl ScanLog {
         let (mut text, mut has_columns) = (Vec::new(), false);
         if lines.next(&mut text)?.is_some_and(|line| line != SIGNATURE.as_bytes()) {
             let what = format!(
-                "not a scan log (its first line is not `{SIGNATURE}`); other tables need a column mapping (--columns)"
+                "not a scan log (its first line is not `{SIGNATURE}`); of other tables `haptize gridize` makes a dataset, by a \
+                 column mapping (--columns)"
             );
             return Err(Error::at(path, what));
         }
