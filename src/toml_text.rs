@@ -1,5 +1,6 @@
 //! Lines, values and comments of a scene file, as a person would have written them.
 
+use crate::names::{escaped, is_disruptive};
 use glam::DVec3;
 use std::fmt::Write;
 
@@ -20,7 +21,15 @@ pub fn entry(text: &mut String, key: &str, value: &str, meaning: &str) -> std::f
 
 /// Returns text that stays within a comment.
 pub fn comment(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    text.chars().map(|c| if is_disruptive(c) { ' ' } else { c }).collect()
+}
+
+/// Returns `text` as a TOML string in which every character is seen.
+pub fn quoted(text: &str) -> String {
+    if !text.contains(is_disruptive) {
+        return toml::Value::from(text).to_string();
+    }
+    format!("\"{}\"", escaped(&text.replace('\\', "\\\\").replace('"', "\\\"")))
 }
 
 /// Returns `values` as a TOML array.
@@ -63,6 +72,15 @@ fn plain(scientific: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn strings_are_read_as_they_were_and_show_what_is_in_them() {
+        for text in ["", "elbow [rad]", "a \"b\" \\ c", "a\nb\u{202e}\\\"c\u{0}", "'\u{2028}"] {
+            let written = quoted(text);
+            assert!(!written.contains(is_disruptive), "{written}");
+            assert_eq!(toml::from_str::<toml::Table>(&format!("a = {written}")).unwrap()["a"].as_str(), Some(text));
+        }
+    }
 
     #[test]
     fn numbers_are_short_and_have_a_point() {

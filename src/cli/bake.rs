@@ -103,8 +103,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let bake = |bake: Bake<'_>| bake.to_file(&output, arguments.resume);
     let sweep = watched(&scene, arguments.backend, |own| bake(Bake { measured: arguments.measure_error, ..own }))?;
-    let baked = Baked::new(sweep, &output, None, earlier)?;
-    Report::of(&baked, baked.is_whole(arguments.allow_free))
+    let mut baked = Baked::new(sweep, &output, None, earlier)?;
+    let is_whole = baked.is_whole(arguments.allow_free);
+    Report::of(&baked, is_whole)
 }
 
 /// A shard that was solved.

@@ -34,7 +34,14 @@ pub struct Baked {
     /// Size of the file (bytes).
     #[serde(skip)]
     bytes: usize,
+    /// Why this is no success.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    defect: Option<&'static str>,
 }
+
+/// The defect of a dataset without a contact.
+const FREE: &str = "the arm touches the object at no grid point: the dataset is whole, and its torque is zero everywhere; \
+                    --allow-free takes that for success";
 
 impl Baked {
     /// Returns the report of `sweep`, which was baked into `file`, for the error `aim` over the rms torque (1) if any.
@@ -47,19 +54,17 @@ impl Baked {
         let is_free = sweep.contact_points == 0;
         let clearance = if is_free { watch::warn_of_free_space(&Dataset::load(file)?)? } else { None };
         let bytes = std::fs::metadata(file).map_or(0, |file| file.len() as usize);
-        Ok(Self { sweep, file: file.display().to_string(), clearance, replaced, aim, bytes })
+        Ok(Self { sweep, file: file.display().to_string(), clearance, replaced, aim, bytes, defect: None })
     }
 
     /// Returns whether something touches, or need not. Every point was solved and has its status: that is the whole
     /// work otherwise.
-    pub fn is_whole(&self, allow_free: bool) -> bool {
-        let touches = self.sweep.contact_points > 0;
-        if !touches && !allow_free {
-            tell(format_args!(
-                "haptize: the dataset is whole, and its torque is zero everywhere; --allow-free takes that for success"
-            ));
+    pub fn is_whole(&mut self, allow_free: bool) -> bool {
+        if self.sweep.contact_points == 0 && !allow_free {
+            tell(format_args!("haptize: {FREE}"));
+            self.defect = Some(FREE);
         }
-        touches || allow_free
+        self.defect.is_none()
     }
 }
 

@@ -6,11 +6,12 @@ use super::{
     report::{Describe, Report, Text},
 };
 use crate::{
+    ErrorKind,
     dataset::{Axis, Dataset, Provenance, Refinement, StatusCounts, Summary},
     names::escaped,
     object::{MeshSummary, Skin},
     scene::{Material, ObjectSpec, Rendering, SkinSpec},
-    toml_text::{number, vector},
+    toml_text::{coarse, list, number, significant},
 };
 use glam::DVec3;
 use serde::Serialize;
@@ -51,7 +52,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let mesh = MeshInfo { file: path.display().to_string(), mesh: MeshSummary::read(path)? };
         return Report::of(&mesh, mesh.mesh.defect.is_none());
     }
-    let dataset = Dataset::open(path)?;
+    let dataset = Dataset::open(path).map_err(|error| match error.kind() {
+        ErrorKind::Foreign => format!("{error}, or a mesh whose name ends in .obj, .stl, .ply or .msh").into(),
+        _ => Failure::from(error),
+    })?;
     let spec = Rendering::parse(&dataset.scene, "scene").ok().and_then(|scene| scene.object);
     let info = Info {
         summary: dataset.summary(),
@@ -87,17 +91,18 @@ impl Describe for MeshInfo {
         if mesh.parts > 1 {
             text.row("parts", format_args!("{} surfaces that are not connected", mesh.parts));
         }
-        let [low, high] = [mesh.low, mesh.high].map(|corner| vector(corner, 4));
-        text.row("size", format_args!("{}, from {low} to {high}", vector(mesh.high - mesh.low, 4)));
-        text.row("edges", format_args!("{:.4} long on average", mesh.mean_edge));
+        let [low, high, size] =
+            [mesh.low, mesh.high, mesh.high - mesh.low].map(|corner| list(&corner.to_array(), |x| significant(*x)));
+        text.row("size", format_args!("{size}, from {low} to {high}"));
+        text.row("edges", format_args!("{} long on average", significant(mesh.mean_edge)));
         if let Some(unit) = mesh.unit {
             let (metres, name) = (unit.metres(), unit.name());
-            let litres = 1e3 * mesh.volume * metres.powi(3);
-            let longest = 1e3 * metres * (mesh.high - mesh.low).max_element();
+            let litres = coarse(1e3 * mesh.volume * metres.powi(3));
+            let longest = significant(1e3 * metres * (mesh.high - mesh.low).max_element());
             let scale = number(metres, 4);
             text.row(
                 "unit",
-                format_args!("{name}, by its size: {longest:.1} mm long and {litres:.4} l with scale = {scale}"),
+                format_args!("{name}, by its size: {longest} mm long and {litres} l with scale = {scale}"),
             );
         } else {
             text.row("unit", "its size fits neither metres nor millimetres: give its scale by hand");

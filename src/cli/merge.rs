@@ -55,8 +55,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     bar.finish();
     interrupt::over();
     let Merged { shards, report } = merged?;
-    let merged = MergedShards { baked: Baked::new(report, output, None, earlier)?, shards, missing: "" };
-    Report::of(&merged, merged.baked.is_whole(arguments.allow_free))
+    let mut baked = Baked::new(report, output, None, earlier)?;
+    let is_whole = baked.is_whole(arguments.allow_free);
+    Report::of(&MergedShards { baked, shards, missing: "" }, is_whole)
 }
 
 /// A dataset put together.

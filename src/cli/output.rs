@@ -4,6 +4,7 @@
 use super::{
     Failure,
     report::{Describe, Text},
+    tell,
 };
 use crate::{
     dataset::{may_be_dataset, replace_file, resolved},
@@ -96,6 +97,8 @@ fn is_table(start: &[u8]) -> bool {
 #[derive(Serialize)]
 pub struct Replaced {
     replaced: Earlier,
+    #[serde(skip)]
+    written: SystemTime,
 }
 
 #[derive(Serialize)]
@@ -138,7 +141,27 @@ pub fn check<'a>(
     }
     let time = there.modified().unwrap_or(SystemTime::UNIX_EPOCH);
     let date = humantime::format_rfc3339_seconds(time).to_string();
-    Ok(Some(Replaced { replaced: Earlier { bytes: there.len(), date } }))
+    Ok(Some(Replaced { replaced: Earlier { bytes: there.len(), date }, written: time }))
+}
+
+/// Returns where to write what cannot be made again and was to go to `output`, where a check found `earlier`: there, or,
+/// where another command has written there since, to the first free name beside it.
+pub fn untaken(output: &Path, earlier: Option<&Replaced>) -> PathBuf {
+    let now = fs::metadata(output).and_then(|there| there.modified()).ok();
+    if now.is_none() || now == earlier.map(|earlier| earlier.written) {
+        return output.to_owned();
+    }
+    let [stem, ending] =
+        [output.file_stem(), output.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
+    let name = |number: u32| output.with_file_name(format!("{stem}-{number}.{ending}"));
+    let free = (2..=u32::MAX).map(name).find(|name| fs::symlink_metadata(name).is_err());
+    let free = free.unwrap_or_else(|| output.to_owned());
+    tell(format_args!(
+        "haptize: note: {} was written by another command meanwhile: {} is written instead",
+        output.display(),
+        free.display()
+    ));
+    free
 }
 
 /// Returns the file that writing to `output` replaces, links followed, if there is one.
@@ -281,5 +304,29 @@ fn is_same(one: &Path, other: &Path) -> bool {
     {
         let place = |path: &Path| -> io::Result<_> { fs::canonicalize(path) };
         matches!((place(one), place(other)), (Ok(one), Ok(other)) if one == other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn what_another_command_has_written_meanwhile_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let [log, second, third] = ["log.csv", "log-2.csv", "log-3.csv"].map(|name| folder.path().join(name));
+        let seen = || check(&log, Content::Log, []).ok().flatten();
+        assert_eq!(untaken(&log, seen().as_ref()), log);
+        let before = seen();
+        fs::write(&log, SESSION).unwrap();
+        assert_eq!(untaken(&log, before.as_ref()), second);
+        fs::write(&second, "").unwrap();
+        assert_eq!(untaken(&log, before.as_ref()), third);
+        let before = seen();
+        assert_eq!(untaken(&log, before.as_ref()), log, "as it was at the beginning");
+        let later = before.as_ref().unwrap().written + Duration::from_secs(1);
+        File::options().write(true).open(&log).unwrap().set_modified(later).unwrap();
+        assert_eq!(untaken(&log, before.as_ref()), third);
     }
 }

@@ -138,7 +138,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         timing.refused.iter().for_each(|refused| tell(format_args!("haptize: note: {refused}")));
     }
     let mut files: Vec<PathBuf> = Vec::new();
-    if let Some(file) = &arguments.record {
+    let recorded = arguments.record.as_ref().map(|file| output::untaken(file, replaced.as_ref()));
+    if let Some(file) = &recorded {
         record(&played, arguments, file)?;
         files.push(file.clone());
     }
@@ -172,7 +173,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         clearance,
         thin_part,
         felt,
-        recording: arguments.record.as_ref().map(|file| Record { file: file.display().to_string(), replaced }),
+        recording: recorded.map(|file| Record {
+            file: file.display().to_string(),
+            replaced: replaced.filter(|_| Some(&file) == arguments.record.as_ref()),
+        }),
         overwritten: filled.close(&files)?,
         files: report::names(&files),
         told,
@@ -293,6 +297,10 @@ fn perform(
 ) -> Result<Played, Failure> {
     let motion = motion::named(setup, dataset, &arguments.motion, arguments.topic.as_deref())?;
     let seconds = arguments.seconds.unwrap_or_else(|| motion.duration());
+    if arguments.seconds.is_none() && seconds == 0.0 {
+        let what = "the motion is a single position: give --seconds how long it is held, or a later position";
+        return Err(format!("{}: {what}", arguments.motion).into());
+    }
     if !(seconds > 0.0 && seconds <= LONGEST) {
         return Err(format!("cannot play {seconds} s: give --seconds between 0 and {LONGEST}").into());
     }

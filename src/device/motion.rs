@@ -242,9 +242,10 @@ impl Columns {
     }
 }
 
-/// Name and unit of a heading such as `elbow [rad]`.
+/// Name and unit of a heading such as `elbow [rad]` or `elbow (rad)`.
 fn heading(field: &str) -> (&str, Option<&str>) {
-    match field.strip_suffix(']').and_then(|field| field.rsplit_once(" [")) {
+    let bracketed = |open, close| field.trim().strip_suffix(close).and_then(|field| field.rsplit_once(open));
+    match bracketed('[', ']').or_else(|| bracketed('(', ')')) {
         Some((name, unit)) => (name.trim(), Some(unit.trim())),
         None => (field.trim(), None),
     }
@@ -330,7 +331,8 @@ mod tests {
     #[test]
     fn columns_are_found_by_the_names_of_the_joints() {
         let expected = read(b"0,1,2\n1,3,4\n").unwrap();
-        let texts: [&[u8]; 3] = [
+        let texts: [&[u8]; 4] = [
+            b"time (s),elbow (rad),shoulder(m)\n0,2,1\n1,4,3\n",
             b"time,elbow,shoulder\n0,2,1\n1,4,3\n",
             b"\xef\xbb\xbfelbow [rad], force [N], \"shoulder [m]\", time [s]\n2,9,1,0\n4,9,3,1\n",
             b"# exported\n\nshoulder,time,elbow\n1,0,2\n3,1,4\n",

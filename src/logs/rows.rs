@@ -239,8 +239,11 @@ fn in_si(unit: Option<ColumnUnit>) -> f64 {
 fn listed(names: &[&str]) -> String {
     const MOST_NAMES: usize = 12;
     const MOST_CHARACTERS: usize = 40;
-    let cut = |name: &&str| name.chars().take(MOST_CHARACTERS).collect::<String>();
-    let mut list = names.iter().take(MOST_NAMES).map(cut).collect::<Vec<_>>().join(", ");
+    let shown = |name: &&str| match name.char_indices().nth(MOST_CHARACTERS) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => (*name).to_owned(),
+    };
+    let mut list = names.iter().take(MOST_NAMES).map(shown).collect::<Vec<_>>().join(", ");
     if names.len() > MOST_NAMES {
         list.push_str(&format!(" and {} more", names.len() - MOST_NAMES));
     }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::Error;
 use crate::scene::Placement;
-use crate::toml_text::{coarse, entry, number, vector};
+use crate::toml_text::{coarse, entry, number, quoted, vector};
 use glam::DVec3;
 use std::fmt::{self, Write};
 use std::path::Path;
@@ -143,7 +143,7 @@ impl BodyFacts<'_> {
         entry(text, "node_mass", &coarse(self.mass), &meaning)?;
         entry(text, "node_damping", &coarse(DAMPING * self.mass), "N s/m, against the ground")?;
         writeln!(text, "\n[object.mesh]")?;
-        entry(text, "file", &toml::Value::from(self.name).to_string(), "relative to this file")?;
+        entry(text, "file", &quoted(self.name), "relative to this file")?;
         entry(text, "scale", &number(self.scale, 4), "to metres")?;
         if self.turn != DVec3::ZERO {
             entry(text, "turn", &vector(self.turn, 6), "rad, about x, then y, then z")?;

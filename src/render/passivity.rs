@@ -164,7 +164,7 @@ pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Op
         let coupling: Vec<String> = coupling.into_iter().flatten().collect();
         alternatives.extend((!coupling.is_empty()).then(|| coupling.join(" and ")));
     } else if alternatives.is_empty() {
-        alternatives.push("more device_damping, or less boundary_slope: no coupling_stiffness is passive".into());
+        alternatives.push(format!("{}: with less, no coupling_stiffness is passive", lacking(spec).join(" and ")));
     }
     if !alternatives.is_empty() {
         remedies.push(alternatives.join("; or else "));
@@ -178,6 +178,25 @@ pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Op
         remedies.join("; ")
     );
     Some(Advice { text, passive: has_coupling(&passive).then_some(passive), changes })
+}
+
+/// What the device of `spec` lacks at each joint at which a bound leaves no stiffness to the coupling.
+fn lacking(spec: &HapticsSpec) -> Vec<String> {
+    let mut lacking = Vec::new();
+    for joint in 0..spec.device_damping.len() {
+        let handed = handed_stiffness(spec, joint);
+        let least = [
+            ("device_damping", spec.device_damping[joint], 0.5 * handed / spec.rate),
+            ("device_friction", spec.device_friction[joint], 0.5 * handed * spec.encoder_step[joint]),
+        ];
+        let has_encoder = spec.encoder_step[joint] > 0.0;
+        for (key, own, least) in least.into_iter().take(if has_encoder { 2 } else { 1 }) {
+            if own <= least {
+                lacking.push(format!("a {key} of joint {} above {}", joint + 1, at_least(least)));
+            }
+        }
+    }
+    lacking
 }
 
 /// Whether the coupling of `spec` has a spring at each joint.

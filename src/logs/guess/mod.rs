@@ -9,7 +9,7 @@ use crate::{
     Error, MAX_AXES, csv,
     gridize::pull,
     names::escaped,
-    toml_text::{coarse, comment, list},
+    toml_text::{coarse, comment, list, quoted},
 };
 use column::{Reading, Role};
 use std::{
@@ -344,7 +344,6 @@ impl MappingFacts<'_> {
 
     fn write(&self, text: &mut String, log: &Path, doubts: &[String]) -> fmt::Result {
         let Self { layout, time, joints, effort, average, .. } = self;
-        let quoted = |text: &str| toml::Value::from(text).to_string();
         writeln!(text, "# Column mapping of {}, guessed. Check:", comment(&log.display().to_string()))?;
         doubts.iter().try_for_each(|doubt| writeln!(text, "# - {}", comment(doubt)))?;
         writeln!(text, "\n[table]\ndelimiter = {}", quoted(&layout.delimiter.to_string()))?;
@@ -420,6 +419,8 @@ mod tests {
             ("# a remark\nt (ms);elbow_pos_deg;elbow_effort_Nmm\n", ';', ','),
             ("time [ms]\telbow q (degrees)\telbow tau (N·mm)\n", '\t', '.'),
             ("stamp_ms elbow_theta_deg elbow_load_mNm\n", ' ', ','),
+            ("sep=;\nms;elbow angle [deg];elbow torque [N mm]\n", ';', ','),
+            ("ms|elbow angle [deg]|elbow torque [N mm]\n", '|', '.'),
             ("% one\n% two\n\u{feff}", ' ', '.'),
         ] {
             for sign in [1.0, -1.0] {

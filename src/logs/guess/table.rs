@@ -18,11 +18,11 @@ const LARGEST: u64 = u64::MAX;
 const NUMERIC: f64 = 0.5;
 
 /// Delimiters and decimal marks that are tried. Where several fit alike, the first is taken.
-const LAYOUTS: [(char, char); 7] =
-    [(',', '.'), (';', '.'), ('\t', '.'), (' ', '.'), (';', ','), ('\t', ','), (' ', ',')];
+const LAYOUTS: [(char, char); 9] =
+    [(',', '.'), (';', '.'), ('\t', '.'), ('|', '.'), (' ', '.'), (';', ','), ('\t', ','), ('|', ','), (' ', ',')];
 
-/// What begins a comment.
-const COMMENTS: [&str; 4] = ["#", "%", "//", "!"];
+/// What begins a comment, or the line by which a spreadsheet names its delimiter.
+const COMMENTS: [&str; 5] = ["#", "%", "//", "!", "sep="];
 
 /// A table as it seems to be laid out, and its first rows.
 pub(super) struct Layout {

@@ -16,7 +16,10 @@ mod text;
 
 use super::{Body, out_of_range, topology::place};
 use crate::scene::Placement;
-use crate::{Error, ErrorKind, input};
+use crate::{
+    Error, ErrorKind,
+    input::{self, GREATEST_INPUT},
+};
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;
@@ -82,6 +85,7 @@ pub(super) fn read_tetrahedra(
     check_scale(placement)?;
     let unreadable = |reason: String| unreadable(file, &reason);
     let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
+    check_coordinates(&mesh.nodes).map_err(unreadable)?;
     let nodes = placement.place(mesh.nodes);
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra, mesh.mid_nodes);
     let ordered = Body { regions: mesh.regions, ..ordered };
@@ -107,6 +111,18 @@ pub(crate) fn length(nodes: &[DVec3]) -> f64 {
 fn check_scale(placement: &Placement) -> Result<(), Error> {
     let value = placement.scale;
     if value > 0.0 && value.is_finite() { Ok(()) } else { Err(out_of_range("scale", value, "positive and finite")) }
+}
+
+/// Refuses coordinates that are no lengths in any unit.
+fn check_coordinates(nodes: &[DVec3]) -> Result<(), String> {
+    let is_length = |node: &DVec3| node.to_array().iter().all(|x| x.abs() <= GREATEST_INPUT);
+    match nodes.iter().position(|node| !is_length(node)) {
+        Some(node) => Err(format!(
+            "node {node}, counted from 0, has a coordinate that is not a number between -{GREATEST_INPUT:e} and \
+             {GREATEST_INPUT:e}: export the mesh again"
+        )),
+        None => Ok(()),
+    }
 }
 
 /// A warning where the scale was forgotten.

@@ -4,7 +4,7 @@
 //! A corner of a face is the number of a vertex, from 1, or counted back from the last one so far, from -1. What
 //! follows it behind a slash (texture and normal) has no meaning here.
 
-use super::{Surface, node_number, polygon, text};
+use super::{Surface, check_coordinates, node_number, polygon, text};
 use glam::DVec3;
 use std::io::Read;
 
@@ -46,6 +46,7 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
     if positions.is_empty() && faces.is_empty() {
         return Err("it has no `v` and no `f` lines: it is not an OBJ text; export the mesh again".to_owned());
     }
+    check_coordinates(&positions)?;
     let mut triangles = Vec::new();
     for (line, face) in faces {
         if let Some(corner) = face.iter().find(|corner| **corner as usize >= positions.len()) {

@@ -4,7 +4,7 @@
 //! announces. So what is announced is held against what can be there before it is called: element counts against the
 //! file's length, list lengths against the line (text) or the bytes that are left (binary).
 
-use super::{Surface, node_number, polygon};
+use super::{Surface, check_coordinates, node_number, polygon};
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyType, ScalarType};
@@ -31,7 +31,9 @@ pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
             _ => drop(elements::<PlyFace>(stream, element, &header)?),
         }
     }
+    nothing_follows(stream, header.encoding)?;
     node_number(nodes.len())?;
+    check_coordinates(&nodes)?;
     let mut triangles = Vec::new();
     for (number, face) in faces.into_iter().enumerate() {
         let cut = match face.corners {
@@ -41,6 +43,21 @@ pub(super) fn read(stream: &mut BufReader<File>) -> Result<Surface, String> {
         triangles.extend(cut.map_err(|reason| format!("face {number}, counted from 0: {reason}"))?);
     }
     Ok((nodes, triangles))
+}
+
+/// Refuses what stands behind the last element: blank lines alone may, in a text.
+fn nothing_follows(stream: &mut BufReader<File>, encoding: Encoding) -> Result<(), String> {
+    let mut rest = Vec::new();
+    stream.read_to_end(&mut rest).map_err(|error| error.to_string())?;
+    let rest = if encoding == Encoding::Ascii { rest.trim_ascii() } else { &rest };
+    if rest.is_empty() {
+        return Ok(());
+    }
+    Err(format!(
+        "{} bytes follow the last element that its header announces: the counts in the header are wrong, or another file \
+         was put behind this one; export the mesh again",
+        rest.len()
+    ))
 }
 
 /// Longest header (bytes).
@@ -100,14 +117,17 @@ fn elements<E: PropertyAccess>(
     }
     let mut elements = Vec::new();
     let mut line = String::new();
-    for _ in 0..element.count {
+    for number in 0..element.count {
         line.clear();
         stream.read_line(&mut line).map_err(|error| error.to_string())?;
-        if !lists_fit(&line, element) {
+        let bad = |what: &str| {
             let start: String = line.chars().take(60).collect();
-            return Err(format!("a {} line is too short: {:?}", element.name, start.trim_end()));
+            format!("{} {number}, counted from 0, {what}: {:?}", element.name, start.trim_end())
+        };
+        if !lists_fit(&line, element) {
+            return Err(bad("has a line that is too short"));
         }
-        elements.push(parser.read_ascii_element(&line, element).map_err(|error| error.to_string())?);
+        elements.push(parser.read_ascii_element(&line, element).map_err(|_| bad("is not a line of finite numbers"))?);
     }
     Ok(elements)
 }

@@ -2,7 +2,7 @@
 //!
 //! A file of several solids is read whole. Normals have no meaning here: the corners' order gives the side.
 
-use super::{Surface, node_number, text};
+use super::{Surface, check_coordinates, node_number, text};
 use glam::DVec3;
 use std::io::Read;
 
@@ -45,6 +45,7 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
         }
         None => return Err("it is too short for an STL file: export the mesh again".to_owned()),
     };
+    check_coordinates(&nodes)?;
     let triangles = (0..node_number(nodes.len())?).step_by(3).map(|node| [node, node + 1, node + 2]).collect();
     Ok((nodes, triangles))
 }

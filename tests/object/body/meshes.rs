@@ -85,6 +85,33 @@ fn a_mesh_is_summed_up_before_it_is_an_object() {
 }
 
 #[test]
+fn what_a_header_does_not_announce_and_coordinates_that_are_no_lengths_are_refused() {
+    let text = std::fs::read_to_string(dataset("cube.ply")).unwrap();
+    assert!(build_from("ply", (text.clone() + "\n  \r\n").as_bytes()).is_ok(), "blank lines may follow");
+    let binary = &binary_cubes()[1].1;
+    let first = text.lines().position(|line| line == "end_header").unwrap() + 1;
+    let with = |number: &str| {
+        let mut lines: Vec<&str> = text.lines().collect();
+        lines[first] = number;
+        lines.join("\n").into_bytes()
+    };
+    let (nodes, faces) = prism(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0);
+    let obj = |number: &str| obj_of(&nodes, &faces).replacen("v 0", &format!("v {number}"), 1).into_bytes();
+    for (ending, content, expected) in [
+        ("ply", (text.clone() + "3 0 1 2\n").into_bytes(), "7 bytes follow the last element"),
+        ("ply", [binary, &b"\0"[..]].concat(), "1 bytes follow the last element"),
+        ("ply", with("nan 0 0"), "vertex 0, counted from 0, is not a line of finite numbers: \"nan 0 0\""),
+        ("ply", with("0 0,5 0"), "vertex 0, counted from 0, is not a line of finite numbers"),
+        ("ply", with("1e30 0 0"), "node 0, counted from 0, has a coordinate"),
+        ("obj", obj("nan"), "node 0, counted from 0, has a coordinate"),
+        ("obj", obj("-inf"), "node 0, counted from 0, has a coordinate"),
+    ] {
+        let error = build_from(ending, &content).unwrap_err().to_string();
+        assert!(error.contains(expected), "{expected}: {error}");
+    }
+}
+
+#[test]
 fn missing_and_unknown_files_are_refused_by_name() {
     let missing = Object::build(&mesh_spec("/nowhere/lost.obj")).unwrap_err();
     assert_eq!(missing.kind(), ErrorKind::File);

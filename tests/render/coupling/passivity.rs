@@ -160,6 +160,24 @@ fn a_layer_and_an_object_that_keep_their_bounds_may_break_the_one_of_both_togeth
     assert_eq!(of_slopes, ["stiffness of layer and object together over 2 bv / T"]);
 }
 
+#[test]
+fn a_device_that_allows_no_spring_is_said_with_what_it_lacks_and_where() {
+    let spec = "[haptics]\nencoder_step = [0.0, 1e-4]\ndevice_friction = [0.1, 0.05]\n";
+    let setup = setup(spec).unwrap();
+    let mut gains = setup.scene.haptics.clone();
+    for (damping, friction, expected) in [
+        ([0.0, 1.0], [0.1, 0.05], "a device_damping of joint 1 above 0: with less, no coupling_stiffness is passive"),
+        ([1.0, 1.0], [0.0, 0.0], "a device_friction of joint 2 above 0: with less"),
+        ([1.0, 0.0], [0.0, 0.0], "a device_damping of joint 2 above 0 and a device_friction of joint 2 above 0"),
+    ] {
+        gains.device_damping.copy_from_slice(&damping);
+        gains.device_friction.copy_from_slice(&friction);
+        let (_, advice) = setup.retuned(&block(spec), &gains).unwrap();
+        let advice = advice.unwrap();
+        assert!(advice.passive.is_none() && advice.text.contains(expected), "{}", advice.text);
+    }
+}
+
 /// The gains that `advice` asks for, by their keys: with `choice`, the second of two alternatives.
 fn advised(advice: &str, choice: bool) -> BTreeMap<String, String> {
     let remedies = advice.split("Set in [haptics]: ").nth(1).unwrap();
