@@ -1,7 +1,7 @@
 //! The object in the window: its nodes advanced by the interpolated contact forces, frame after frame: on the GPU, or on
 //! the CPU where it is too large for that.
 
-use super::{links::filled, loaded::Loaded, view_renderer::Surface};
+use super::{links::filled, loaded::Loaded, probe::Probe, view_renderer::Surface};
 use crate::{
     Error, JointVector,
     contact::Status,
@@ -151,6 +151,28 @@ impl Body {
     #[must_use]
     pub fn rest(&self, node: usize) -> Vec3 {
         self.rest[node]
+    }
+
+    /// Where all its nodes are (m). Waits for the device.
+    ///
+    /// # Errors
+    /// When the device has failed.
+    pub fn places(&self) -> Result<Vec<DVec3>, GpuError> {
+        let moved = self.update.drawn()?;
+        Ok(self.rest.iter().zip(moved).map(|(rest, moved)| rest.as_dvec3() + moved).collect())
+    }
+
+    /// What is known of `vertex`. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device has failed.
+    pub fn probe(&self, vertex: usize) -> Result<Option<Probe>, GpuError> {
+        let (moved, forces) = (self.update.drawn()?, self.forces.contact());
+        Ok(moved.get(vertex).map(|&displacement| Probe {
+            vertex,
+            displacement,
+            force: forces.get(vertex).copied().unwrap_or_default(),
+        }))
     }
 
     /// Nodes with a contact force, and that force (N).
