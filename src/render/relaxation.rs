@@ -15,9 +15,10 @@
 //! that it would not give without memory, whatever the motion.
 //!
 //! *Sliding* meets fresh material: over a way s of slip ([`crate::contact::Slip`]) each z_i falls by `exp(-s / l)`, l
-//! the distance from a point of contact at which its dent is 1/e as deep. Where that raises H, it is paid by a drag of
-//! size `P = sum g_i (w - z_i)+ z_i / l` against the slip, a damper `P / |slip rate|` that is implicit in the step. Where
-//! the drag took less than H would rise, z falls by so much less, H being convex in it.
+//! the way over which the arm leaves its dent: one of the same forces so far beside has 1/e of the energy in common with
+//! it, under a single point where its dent is 1/e as deep. Where forgetting raises H, it is paid by a drag of size
+//! `P = sum g_i (w - z_i)+ z_i / l` against the slip, a damper `P / |slip rate|` that is implicit in the step. Where the
+//! drag took less than H would rise, z falls by so much less, H being convex in it.
 
 use super::npmi::Load;
 use crate::{
