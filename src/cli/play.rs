@@ -64,6 +64,11 @@ pub struct Arguments {
     /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
     #[arg(long)]
     exact: bool,
+    /// Solve in every tick the contact of an object that remembers node by node, in place of the loop's one number a term
+    /// of [object.relaxation]: what that is compared with. Slower than time. Of a dataset the contact is that of its
+    /// scene.
+    #[arg(long, conflicts_with_all = ["device", "realtime"])]
+    reference: bool,
     /// A real device instead of a simulated hand, always against the clock: KIND or KIND:PLACE, as `haptize device
     /// list` shows it.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["exact", "beside", "replay"])]
@@ -99,7 +104,7 @@ const LONGEST: f64 = 3600.0;
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
     let Outputs { filled, replaced } = Outputs::check(arguments, &folder)?;
-    let live = live(&arguments.dataset)?;
+    let live = live(arguments)?;
     let dataset = Arc::new(match &live {
         Some(scene) => scene.dataset(),
         None => Dataset::load(&arguments.dataset)?,
@@ -405,9 +410,17 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
     Ok(())
 }
 
-/// The scene at `path`, prepared to be solved live; none where `path` is no scene.
-fn live(path: &Path) -> Result<Option<Arc<LiveScene>>, Failure> {
-    Ok(if Scene::is_at(path) { Some(Arc::new(LiveScene::new(Scene::load(path)?)?)) } else { None })
+/// The scene that `arguments` name, or that of the dataset where a reference is wanted, prepared to be solved live; none
+/// of a dataset that is looked up.
+fn live(arguments: &Arguments) -> Result<Option<Arc<LiveScene>>, Failure> {
+    let path = &arguments.dataset;
+    let scene = match (Scene::is_at(path), arguments.reference) {
+        (true, _) => Scene::load(path)?,
+        (false, true) => Scene::parse(&Dataset::load(path)?.scene, path)?,
+        (false, false) => return Ok(None),
+    };
+    let live = if arguments.reference { LiveScene::remembering(&scene) } else { LiveScene::new(scene) };
+    Ok(Some(Arc::new(live?)))
 }
 
 /// Returns which of the files that a session writes are there already.
