@@ -181,5 +181,6 @@ def gridize(
     epsilon: float | None = None,
     smooth: bool = False,
     interpolation: str = "linear",
+    within: float = 1.5,
 ) -> Dataset: ...
 def main(arguments: Sequence[str]) -> int: ...

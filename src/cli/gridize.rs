@@ -12,7 +12,7 @@ use crate::{
     Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
-        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Reversals, Samples, gridize,
+        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Reversals, Samples, WITHIN, gridize,
         gridize_remembering, gridize_sliding, predict_histories,
         prediction::{Prediction, held_out, predict},
     },
@@ -85,6 +85,10 @@ pub struct Arguments {
     /// Smooth torques within their measured standard deviation first.
     #[arg(long)]
     smooth: bool,
+    /// Distance from the samples at which the measured region ends inside their convex hull, too, in spacings of the samples;
+    /// `inf` for the hull alone.
+    #[arg(long, default_value_t = WITHIN, value_name = "SPACINGS", allow_negative_numbers = true)]
+    within: f64,
     /// Measure how well the dataset predicts measurements: this fraction of the samples is left out of a second one,
     /// which has to predict them.
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true, value_parser = super::fraction)]
@@ -180,6 +184,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         epsilon: arguments.epsilon.or(source.epsilon),
         interpolation: arguments.interpolation,
         smooth: arguments.smooth,
+        within: arguments.within,
     };
     let (dataset, report) = source.gridize(&options)?;
     if report.inside == 0 {
@@ -212,6 +217,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         report,
         file: output.display().to_string(),
         source: source.kind,
+        within: arguments.within,
         seconds: started.elapsed().as_secs_f64(),
         import: source.import,
         left_out: source.left_out,
@@ -244,6 +250,8 @@ struct Gridized {
     file: String,
     /// `scan`, `simulated scan` or `import`.
     source: &'static str,
+    /// Distance from the samples at which the measured region ends, in their spacings (1).
+    within: f64,
     /// Wall time, and the part of it for reading (s).
     seconds: f64,
     #[serde(skip)]
@@ -469,8 +477,8 @@ impl Describe for IdentifiedFriction {
 
 impl Describe for Gridized {
     fn describe(&self, text: &mut Text) {
-        let Self { file, source, of, seconds, reading, import, left_out, .. } = self;
-        let GridizeReport { samples, merged, points, inside, contact_points, epsilon, .. } = &self.report;
+        let Self { file, source, of, seconds, reading, import, left_out, within, .. } = self;
+        let GridizeReport { samples, merged, points, inside, contact_points, epsilon, far, spacing } = &self.report;
         text.line(format_args!("{file}: {inside} grid points of {points} inside the measured region"));
         text.row("made from", format_args!("{samples} samples ({source}: {of})"));
         if *merged > 0 {
@@ -480,6 +488,22 @@ impl Describe for Gridized {
             [first, others @ ..] if others.iter().all(|axis| axis.unit == first.unit) => first.effort_unit(),
             _ => "N m or N",
         };
+        if *far > 0 {
+            let mut spacings: Vec<String> = Vec::new();
+            for (spacing, axis) in spacing.iter().zip(&self.axes) {
+                let told = format!("{} {}", coarse(within * spacing), axis.unit);
+                if !spacings.contains(&told) {
+                    spacings.push(told);
+                }
+            }
+            text.row(
+                "far",
+                format_args!(
+                    "{far} grid points between the samples are left out: more than {within} spacings ({}) from any",
+                    spacings.join(", ")
+                ),
+            );
+        }
         text.row("in contact", format_args!("{contact_points} points, torque above {epsilon:.4} {unit}"));
         if *left_out > 0 {
             text.row("left out", watch::counted(*left_out, ["row", "rows"]));

@@ -261,7 +261,13 @@ mod tests {
         let histories = [0.4, 0.5, 0.6].map(|gear| log(10.0 * gear, gear, &mut noise));
         let reversals = Reversals { histories: &histories, lead: 0, cell: &[0.01, 0.01] };
         let interpolation = gridize::Interpolation::Linear;
-        let options = GridizeOptions { steps: vec![0.02], epsilon: Some(0.0), interpolation, smooth: false };
+        let options = GridizeOptions {
+            steps: vec![0.02],
+            epsilon: Some(0.0),
+            interpolation,
+            smooth: false,
+            within: f64::INFINITY,
+        };
         let (dataset, report) = gridize_sliding(&joints, &reversals, &options).unwrap();
         let found = dataset.provenance.friction.clone().unwrap();
         println!("{found:?}, {report:?}");
