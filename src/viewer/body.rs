@@ -153,21 +153,29 @@ impl Body {
         self.rest[node]
     }
 
-    /// Where all its nodes are (m). Waits for the device.
+    /// How far its nodes are from their places at rest (m). Waits for the device that moves them.
+    fn displacements(&self) -> Result<Vec<DVec3>, GpuError> {
+        match &self.motion {
+            Motion::Device(update) => update.drawn(),
+            Motion::Host(host) => Ok(host.moved.borrow_dependent().displacements().collect()),
+        }
+    }
+
+    /// Where its nodes are (m).
     ///
     /// # Errors
     /// When the device has failed.
     pub fn places(&self) -> Result<Vec<DVec3>, GpuError> {
-        let moved = self.update.drawn()?;
+        let moved = self.displacements()?;
         Ok(self.rest.iter().zip(moved).map(|(rest, moved)| rest.as_dvec3() + moved).collect())
     }
 
-    /// What is known of `vertex`. Waits for the device.
+    /// What is known of `vertex`.
     ///
     /// # Errors
     /// When the device has failed.
     pub fn probe(&self, vertex: usize) -> Result<Option<Probe>, GpuError> {
-        let (moved, forces) = (self.update.drawn()?, self.forces.contact());
+        let (moved, forces) = (self.displacements()?, self.forces.contact());
         Ok(moved.get(vertex).map(|&displacement| Probe {
             vertex,
             displacement,
