@@ -17,7 +17,7 @@ use haptize::{
     Error, JointVector,
     dataset::Dataset,
     device::Motion,
-    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate},
+    gpu::{AdapterChoice, Context, FrameUpdate},
     render::{
         graphics::{ContactForces, DrawnForces, Graphics},
         haptic::Inputs,
@@ -192,13 +192,15 @@ struct Body {
 }
 
 impl Body {
-    /// One per variant; none without graphics.
+    /// One per variant; none without graphics, or where the CPU moves the object.
     fn all(context: &Arc<Context>, setups: &[Setup], datasets: &[Dataset]) -> Result<Vec<Option<Self>>, Error> {
         let body = |(setup, dataset): (&Setup, &Dataset)| {
             let (Some(object), Some(graphics)) = (&setup.object, &setup.scene.graphics) else { return Ok(None) };
+            if !FrameUpdate::suits(object.mechanics()?) {
+                return Ok(None);
+            }
             let relaxation = setup.scene.haptics.relaxation.as_ref();
-            let (nodes, period, method) =
-                (object.rest.len(), 1.0 / graphics.rate, FrameMethod::suitable(object.mechanics()?));
+            let (nodes, period) = (object.rest.len(), 1.0 / graphics.rate);
             Ok(Some(Self {
                 contact: ContactForces::new(dataset, nodes).unwrap(),
                 forces: DrawnForces::new(nodes, graphics, relaxation),
@@ -206,7 +208,6 @@ impl Body {
                     Arc::clone(context),
                     object,
                     period,
-                    method,
                     &graphics.effects,
                     relaxation.is_some(),
                 )?,

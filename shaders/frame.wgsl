@@ -1,4 +1,4 @@
-// Frame update of small objects: the inverse of the matrix on the left was computed beforehand. Two stages, because the
+// The object's frame update: the inverse of the matrix on the left was computed beforehand. Two stages, because the
 // second needs the whole of the first's result.
 
 // Whether the three coordinates are alike and independent: then the inverse has one number for a pair of nodes.

@@ -1,4 +1,4 @@
-// What both forms of the object's frame update share (non-iterative passive mechanical integration, paper's section
+// What the stages of the object's frame update share (non-iterative passive mechanical integration, paper's section
 // 3.2):
 //     (2M/T + B + (T/2) K) v_hat = (2M/T) v_k - K u_k + f,    u_{k+1} = u_k + T v_hat,    v_{k+1} = 2 v_hat - v_k
 // with u = n - n0. Displacements are the state, not positions: f32 resolves them better. Quasi-static graphics has no
@@ -8,10 +8,6 @@ struct FrameParameters {
     nodes: u32,
     // T [s].
     period: f32,
-    // Parity of the iteration.
-    odd: u32,
-    // Workgroups of a stage with one invocation a node.
-    groups: u32,
 }
 
 override WORKGROUP: u32 = 64u;
@@ -52,14 +48,6 @@ fn right_side(node: u32) -> vec3<f32> {
         sum -= block(entry) * state[column(entry)].xyz;
     }
     return sum;
-}
-
-// 2M/T + B of one node.
-fn inertial(node: u32) -> f32 {
-    if QUASI_STATIC {
-        return 0.0;
-    }
-    return 2.0 * inertia[node].x / parameters.period + inertia[node].y;
 }
 
 // u_{k+1} and v_{k+1} of one node.

@@ -1,9 +1,8 @@
 //! The object's nodes, one passive step a frame (theory: non-iterative passive mechanical integration):
 //! `(2M/T + B + (T/2) K) v_hat = (2M/T) v_k - K (n_k - n0) + f`, `n_{k+1} = n_k + T v_hat`, `v_{k+1} = 2 v_hat - v_k`.
 //!
-//! The state stays on the device, in a buffer that a viewer draws from. Small objects multiply by the inverse of the
-//! matrix, computed once in f64; large ones, whose inverse would not fit, take a fixed number of conjugate-gradient
-//! iterations, which keeps the step passive however few they are (see `shaders/frame_iterative.wgsl`).
+//! The state stays on the device, in a buffer that a viewer draws from, and is multiplied by the inverse of the matrix,
+//! computed once in f64. Large objects, whose inverse would not fit, are moved by the sparse factor on the CPU.
 //!
 //! Effects, as in `render/object_motion.rs`, which is the twin: under gravity and with stiffening the nodes' loads are
 //! a buffer of their own, forces and weight from the host; stiffening adds its part to it, in a stage of its own, and
@@ -23,42 +22,10 @@ use std::sync::Arc;
 /// Invocations of a workgroup; the shader's default.
 const WORKGROUP: u32 = 64;
 
-/// Size of a node's force, displacement, velocity, or vector of the iteration (B).
+/// Size of a node's force, displacement or velocity (B).
 const VECTOR: u64 = 16;
 
-/// Which solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FrameMethod {
-    /// Inverse computed beforehand: 4 N^2 bytes where springs and ground are isotropic, else 36 N^2; two dispatches a
-    /// frame.
-    Inverse,
-    /// This many iterations of conjugate gradients a frame, at least one.
-    Iterations(u32),
-}
-
-impl FrameMethod {
-    /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground
-    /// are isotropic, else of 1,000 (B).
-    const MOST_BYTES_INVERTED: usize = 36_000_000;
-
-    /// Enough iterations for objects whose springs reach a few dozen edges in one period.
-    pub const USUAL_ITERATIONS: u32 = 32;
-
-    /// Chooses the method for an object.
-    #[must_use]
-    pub fn suitable(mechanics: &Mechanics) -> Self {
-        let Mechanics { stiffness, moved, .. } = mechanics;
-        let order = if stiffness.is_isotropic() { moved.len() } else { 3 * moved.len() };
-        if order.saturating_pow(2) <= Self::MOST_BYTES_INVERTED / size_of::<f32>() {
-            Self::Inverse
-        } else {
-            Self::Iterations(Self::USUAL_ITERATIONS)
-        }
-    }
-}
-
 /// One dispatch of every frame.
-#[derive(Clone)]
 struct FramePass {
     kernel: Arc<Kernel>,
     bound: wgpu::BindGroup,
@@ -123,20 +90,27 @@ impl FrameCost {
 }
 
 impl FrameUpdate {
+    /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground
+    /// are isotropic, else of 1,000 (B).
+    const MOST_BYTES_INVERTED: usize = 36_000_000;
+
+    /// Whether the inverse of an object's matrix is small enough to be multiplied by in every frame: 4 N^2 bytes where
+    /// springs and ground are isotropic, else 36 N^2.
+    #[must_use]
+    pub fn suits(mechanics: &Mechanics) -> bool {
+        let Mechanics { stiffness, moved, .. } = mechanics;
+        let order = if stiffness.is_isotropic() { moved.len() } else { 3 * moved.len() };
+        order.saturating_pow(2) <= Self::MOST_BYTES_INVERTED / size_of::<f32>()
+    }
+
     /// The object in equilibrium under no forces but its weight, where there is one, to be advanced by `period` (s) a
     /// frame. Smoothing is no matter of the device: forces are filtered before they come here.
     ///
     /// # Errors
     /// When the matrix is not positive definite (masses, damping or period are not positive), its inverse would not fit
     /// in memory, or the device refuses.
-    pub fn new(
-        context: Arc<Context>,
-        object: &Object,
-        period: f64,
-        method: FrameMethod,
-        effects: &GraphicsEffects,
-    ) -> Result<Self, Error> {
-        Self::remembering(context, object, period, method, effects, false)
+    pub fn new(context: Arc<Context>, object: &Object, period: f64, effects: &GraphicsEffects) -> Result<Self, Error> {
+        Self::remembering(context, object, period, effects, false)
     }
 
     /// As [`FrameUpdate::new`]; `remembers`: a body force of the object's past acts beside the contact forces.
@@ -147,7 +121,6 @@ impl FrameUpdate {
         context: Arc<Context>,
         object: &Object,
         period: f64,
-        method: FrameMethod,
         effects: &GraphicsEffects,
         remembers: bool,
     ) -> Result<Self, Error> {
@@ -172,30 +145,14 @@ impl FrameUpdate {
             stages.push(common.stiffening_stage(gpu, &reach, loads, [spec.factor, spec.strain])?);
         }
         let mut overrides = if effects.quasi_static { vec![("QUASI_STATIC", 1.0)] } else { Vec::new() };
-        match method {
-            FrameMethod::Inverse => {
-                let (inverse, is_isotropic) = inverse(mechanics, stiffness, period, effects)?;
-                if is_isotropic {
-                    overrides.push(("ISOTROPIC", 1.0));
-                }
-                let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
-                let right = StorageBuffer::new(gpu, "right-hand side", 12 * u64::from(common.parameters.nodes))?;
-                buffers.extend([inverse.size(), right.size()]);
-                stages.extend(common.dense_stages(gpu, [&inverse, &right], &overrides)?);
-            }
-            FrameMethod::Iterations(iterations) => {
-                let odd = StorageBuffer::uniform(
-                    gpu,
-                    "frame parameters",
-                    &[FrameParameters { odd: 1, ..common.parameters }],
-                )?;
-                let vectors = WORK_VECTORS * VECTOR * u64::from(common.parameters.nodes);
-                let work = StorageBuffer::new(gpu, "conjugate gradients", vectors)?;
-                let sums = StorageBuffer::new(gpu, "sums", 3 * 4 * u64::from(common.parameters.groups))?;
-                buffers.extend([odd.size(), work.size(), sums.size()]);
-                stages.extend(common.iterative_stages(gpu, &odd, [&work, &sums], iterations, &overrides)?);
-            }
+        let (inverse, is_isotropic) = inverse(mechanics, stiffness, period, effects)?;
+        if is_isotropic {
+            overrides.push(("ISOTROPIC", 1.0));
         }
+        let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
+        let right = StorageBuffer::new(gpu, "right-hand side", 12 * u64::from(common.nodes))?;
+        buffers.extend([inverse.size(), right.size()]);
+        stages.extend(common.stages(gpu, [&inverse, &right], &overrides)?);
         let attachment = mechanics.attachment.clone();
         let followers = if attachment.is_identity() {
             None
@@ -367,14 +324,10 @@ fn check_memory(nodes: usize, is_isotropic: bool) -> Result<(), Error> {
     enough.map_err(|shortage| error!("the motion of an object of {nodes} nodes: {shortage}, or use a coarser surface"))
 }
 
-/// Vectors of the iteration: v_hat, residual, direction, product, diagonal.
-const WORK_VECTORS: u64 = 5;
-
 /// Buffers that all stages bind.
 struct Common {
-    /// The parameters of even iterations.
-    parameters: FrameParameters,
-    even: StorageBuffer,
+    nodes: u32,
+    parameters: StorageBuffer,
     structure: StorageBuffer,
     blocks: StorageBuffer,
     /// Masses and damping; none in quasi-static graphics.
@@ -408,11 +361,10 @@ impl Common {
             .zip(&mechanics.damping)
             .map(|(&mass, &damping)| [mass as f32, damping as f32])
             .collect();
-        let groups = (nodes as u32).div_ceil(WORKGROUP);
-        let parameters = FrameParameters { nodes: nodes as u32, period: period as f32, odd: 0, groups };
+        let parameters = FrameParameters { nodes: nodes as u32, period: period as f32 };
         Ok(Self {
-            parameters,
-            even: StorageBuffer::uniform(gpu, "frame parameters", &[parameters])?,
+            nodes: parameters.nodes,
+            parameters: StorageBuffer::uniform(gpu, "frame parameters", &[parameters])?,
             structure: StorageBuffer::from_slice(gpu, "stiffness structure", &structure)?,
             blocks: StorageBuffer::from_slice(gpu, "stiffness blocks", &blocks)?,
             inertia: (!effects.quasi_static)
@@ -426,8 +378,8 @@ impl Common {
 
     /// Sizes of the buffers (B).
     fn sizes(&self) -> Vec<u64> {
-        let Self { parameters: _, even, structure, blocks, inertia, forces, loads, state } = self;
-        let always = [state, forces, structure, blocks, even];
+        let Self { nodes: _, parameters, structure, blocks, inertia, forces, loads, state } = self;
+        let always = [state, forces, structure, blocks, parameters];
         always.into_iter().chain(inertia).chain(loads).map(StorageBuffer::size).collect()
     }
 
@@ -444,12 +396,11 @@ impl Common {
     /// Bindings of a stage on which `forces` act and that has two buffers of its own.
     fn bindings<'a>(
         &'a self,
-        parameters: &'a StorageBuffer,
         forces: &'a StorageBuffer,
         own: [(&'a str, &'a StorageBuffer); 2],
     ) -> [(&'a str, &'a StorageBuffer); 8] {
         [
-            ("parameters", parameters),
+            ("parameters", &self.parameters),
             ("structure", &self.structure),
             ("blocks", &self.blocks),
             ("inertia", self.masses()),
@@ -468,23 +419,23 @@ impl Common {
         loads: &StorageBuffer,
         [factor, strain]: [f64; 2],
     ) -> Result<FramePass, GpuError> {
-        let Self { even, structure, blocks, forces, .. } = self;
+        let Self { nodes, structure, blocks, forces, .. } = self;
         let constants = [("FACTOR", factor), ("STRAIN", strain)];
         let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants)?);
-        let bound = kernel.bind(gpu, &self.bindings(even, forces, [("reach", reach), ("loads", loads)]))?;
+        let bound = kernel.bind(gpu, &self.bindings(forces, [("reach", reach), ("loads", loads)]))?;
         // Forces and what is added to them are read and written, displacements read.
-        let vectors = 3 * VECTOR * u64::from(self.parameters.nodes);
+        let vectors = 3 * VECTOR * u64::from(*nodes);
         let bytes = structure.size() + blocks.size() + reach.size() + vectors;
-        Ok(FramePass { kernel, bound, workgroups: self.parameters.groups, bytes })
+        Ok(FramePass { kernel, bound, workgroups: nodes.div_ceil(WORKGROUP), bytes })
     }
 
-    fn dense_stages(
+    fn stages(
         &self,
         gpu: &Context,
         [inverse, right]: [&StorageBuffer; 2],
         overrides: &[(&str, f64)],
     ) -> Result<[FramePass; 2], GpuError> {
-        let buffers = self.bindings(&self.even, self.acting(), [("inverse", inverse), ("right", right)]);
+        let buffers = self.bindings(self.acting(), [("inverse", inverse), ("right", right)]);
         let stage = |shader, workgroups, bytes| -> Result<FramePass, GpuError> {
             let kernel = Arc::new(Kernel::new(gpu, shader, overrides)?);
             let bound = kernel.bind(gpu, &buffers)?;
@@ -492,44 +443,8 @@ impl Common {
         };
         let load = buffers[1..6].iter().map(|(_, buffer)| buffer.size()).sum::<u64>() + right.size();
         let advance = inverse.size() + right.size() + 2 * self.state.size();
-        let FrameParameters { nodes, groups, .. } = self.parameters;
-        Ok([stage(&shaders::FRAME_LOAD, groups, load)?, stage(&shaders::FRAME_ADVANCE, nodes, advance)?])
-    }
-
-    fn iterative_stages(
-        &self,
-        gpu: &Context,
-        odd: &StorageBuffer,
-        [work, sums]: [&StorageBuffer; 2],
-        iterations: u32,
-        overrides: &[(&str, f64)],
-    ) -> Result<Vec<FramePass>, GpuError> {
-        let workgroups = self.parameters.groups;
-        let own = [("work", work), ("sums", sums)];
-        let stage = |shader, bytes| -> Result<FramePass, GpuError> {
-            let kernel = Arc::new(Kernel::new(gpu, shader, overrides)?);
-            let bound = kernel.bind(gpu, &self.bindings(&self.even, self.acting(), own))?;
-            Ok(FramePass { kernel, bound, workgroups, bytes })
-        };
-        // The same kernel with the bindings of the odd iterations.
-        let odd = |stage: &FramePass| -> Result<FramePass, GpuError> {
-            let bound = stage.kernel.bind(gpu, &self.bindings(odd, self.acting(), own))?;
-            Ok(FramePass { bound, ..stage.clone() })
-        };
-        // Of the five vectors of the iteration, how many are read and written.
-        let vectors = |count: u64| count * work.size() / WORK_VECTORS;
-        let matrix = self.structure.size() + self.blocks.size() + self.masses().size();
-        let product = stage(&shaders::FRAME_PRODUCT, matrix + vectors(2))?;
-        let correct = stage(&shaders::FRAME_CORRECT, vectors(7))?;
-        let turn = stage(&shaders::FRAME_TURN, vectors(4))?;
-        let turns = [[product.clone(), correct.clone(), turn.clone()], [odd(&product)?, odd(&correct)?, odd(&turn)?]];
-        let states = self.acting().size() + self.state.size();
-        let mut stages = vec![stage(&shaders::FRAME_BEGIN, matrix + states + vectors(4))?];
-        for iteration in 0..iterations.max(1) as usize {
-            stages.extend_from_slice(&turns[iteration % 2]);
-        }
-        stages.push(stage(&shaders::FRAME_FINISH, vectors(1) + 2 * self.state.size())?);
-        Ok(stages)
+        let groups = self.nodes.div_ceil(WORKGROUP);
+        Ok([stage(&shaders::FRAME_LOAD, groups, load)?, stage(&shaders::FRAME_ADVANCE, self.nodes, advance)?])
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     draw::{camera::Camera, colour::ColourMap},
-    gpu::{Context, FrameUpdate, GpuError},
+    gpu::{Context, GpuError},
     object::Object,
 };
 use glam::{Mat4, Vec3};
@@ -76,11 +76,12 @@ struct Targets {
 const LARGEST_SIDE: u32 = 8192;
 
 impl Surface {
-    /// `object` as `update` moves it.
+    /// `object`, its nodes' displacements (m) and the contact forces on them (N) in the buffers `moved`, four numbers a
+    /// node.
     ///
     /// # Errors
     /// When the device refuses the buffers.
-    pub fn new(context: &Context, object: &Object, update: &FrameUpdate) -> Result<Self, GpuError> {
+    pub fn new(context: &Context, object: &Object, moved: [&wgpu::Buffer; 2]) -> Result<Self, GpuError> {
         let rest: Vec<[f32; 4]> = object.rest.iter().map(|point| point.as_vec3().extend(0.0).to_array()).collect();
         let topology = &object.topology;
         let mut mesh: Vec<u32> = object.triangles.as_flattened().to_vec();
@@ -92,7 +93,8 @@ impl Surface {
         let rest = storage("drawn rest positions", bytemuck::cast_slice(&rest))?;
         let mesh = storage("drawn mesh", bytemuck::cast_slice(&mesh))?;
         let nodes = topology.around_offsets.len().saturating_sub(1) as u32;
-        let bindings = [rest, update.state_buffer().clone(), update.force_buffer().clone(), mesh];
+        let [state, forces] = moved.map(Clone::clone);
+        let bindings = [rest, state, forces, mesh];
         Ok(Self { bindings, nodes, triangles: object.triangles.len() as u32 })
     }
 }

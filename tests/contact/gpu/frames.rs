@@ -3,22 +3,22 @@
 use super::fixture::{context, load, load_of};
 use glam::DVec3;
 use haptize::{
-    gpu::{FrameMethod, FrameUpdate},
+    gpu::FrameUpdate,
     object::Object,
     render::graphics::ObjectMotion,
     scene::{ElasticSpec, GraphicsEffects, Material, Scene, SkinSpec, SpringKind, SpringSpec, StiffeningSpec},
 };
 
 /// A push on one node for some frames, then none: states of both sides after each frame.
-fn frames(method: FrameMethod, check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
-    frames_of(&load("sphere.toml").1, method, check);
+fn frames(check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
+    frames_of(&load("sphere.toml").1, check);
 }
 
 /// The same for another object.
-fn frames_of(object: &Object, method: FrameMethod, check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
+fn frames_of(object: &Object, check: impl Fn(usize, &ObjectMotion, &[DVec3], &[DVec3])) {
     let period = 1.0 / 60.0;
     let mut twin = ObjectMotion::new(object, period, &GraphicsEffects::default()).unwrap();
-    let mut gpu = FrameUpdate::new(context(), object, period, method, &GraphicsEffects::default()).unwrap();
+    let mut gpu = FrameUpdate::new(context(), object, period, &GraphicsEffects::default()).unwrap();
     for frame in 0..40 {
         let mut forces = vec![DVec3::ZERO; object.rest.len()];
         if frame < 15 {
@@ -56,19 +56,15 @@ fn energy(object: &Object, displacement: &[DVec3], velocity: &[DVec3]) -> f64 {
 #[test]
 fn frames_follow_the_cpus() {
     // Forty frames of sums of three hundred terms rounded by 6e-8 each.
-    frames(FrameMethod::Inverse, |frame, twin, displacement, velocity| {
+    frames(|frame, twin, displacement, velocity| {
         assert!(relative(twin.displacement(), displacement) < 1e-4, "frame {frame}");
         assert!(relative(twin.velocity(), velocity) < 1e-4, "frame {frame}");
-    });
-    frames(FrameMethod::Iterations(60), |frame, twin, displacement, velocity| {
-        assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
-        assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
     });
     // Springs along the edges couple the coordinates: the inverse has nine numbers for a pair of nodes, of which the
     // others need one.
     let axial = Material::Springs(SpringSpec { kind: SpringKind::Axial, stiffness: 300.0 });
     let (_, axial, _) = load_of("sphere.toml", Some(axial));
-    frames_of(&axial, FrameMethod::Inverse, |frame, twin, displacement, velocity| {
+    frames_of(&axial, |frame, twin, displacement, velocity| {
         assert!(relative(twin.displacement(), displacement) < 1e-4, "frame {frame}");
         assert!(relative(twin.velocity(), velocity) < 1e-4, "frame {frame}");
     });
@@ -76,25 +72,12 @@ fn frames_follow_the_cpus() {
     let elastic = ElasticSpec { young: 1e4, poisson: 0.3, cell: Some(0.03), inclusions: Vec::new() };
     let (_, solid, _) = load_of("sphere.toml", Some(Material::Elastic(elastic)));
     assert!(!solid.mechanics().unwrap().attachment.is_identity());
-    frames_of(&solid, FrameMethod::Inverse, |frame, twin, displacement, velocity| {
+    frames_of(&solid, |frame, twin, displacement, velocity| {
         assert!(relative(twin.displacement(), displacement) < 1e-3, "frame {frame}");
         assert!(relative(twin.velocity(), velocity) < 1e-3, "frame {frame}");
     });
     let rotated: Vec<DVec3> = [DVec3::X, DVec3::Y].into();
     assert!(relative(&[DVec3::X, DVec3::X], &rotated) > 1.0, "the comparator tells fields apart");
-}
-
-/// Memory of the device for the inverse: what its method takes beyond the buffers of the other, whose sizes are known.
-fn inverse_bytes(object: &Object) -> u64 {
-    let takes = |method| {
-        let update = FrameUpdate::new(context(), object, 1.0 / 60.0, method, &GraphicsEffects::default()).unwrap();
-        update.takes().bytes
-    };
-    let nodes = object.rest.len() as u64;
-    // Five vectors of four numbers a node, three sums a workgroup of 64, and parameters once more.
-    let of_iterations = 5 * 16 * nodes + 12 * nodes.div_ceil(64) + 16;
-    let right_hand_side = 12 * nodes;
-    takes(FrameMethod::Inverse) - right_hand_side - (takes(FrameMethod::Iterations(1)) - of_iterations)
 }
 
 /// Where the three coordinates are alike, with a skin too, one number serves a pair of nodes.
@@ -104,8 +87,13 @@ fn an_isotropic_body_binds_one_number_for_a_pair_of_nodes() {
         let mut scene = load("sphere.toml").0;
         change(&mut scene);
         let object = Object::build(&scene.object).unwrap();
-        let pairs = (object.rest.len() as u64).pow(2);
-        (object.mechanics().unwrap().stiffness.is_isotropic(), inverse_bytes(&object) / 4, pairs)
+        let stiffness = &object.mechanics().unwrap().stiffness;
+        let (nodes, blocks) = (object.rest.len() as u64, stiffness.blocks.len() as u64);
+        let update = FrameUpdate::new(context(), &object, 1.0 / 60.0, &GraphicsEffects::default()).unwrap();
+        // Numbers of four bytes: two parameters, the structure of K and its blocks, mass and damping, force, state, and
+        // right-hand side.
+        let others = 2 + (nodes + 1 + blocks) + 9 * blocks + (2 + 4 + 8 + 3) * nodes;
+        (stiffness.is_isotropic(), update.takes().bytes / 4 - others, nodes.pow(2))
     };
     let (is_isotropic, numbers, pairs) = of(&|_| ());
     assert!(is_isotropic && numbers == pairs, "{numbers} numbers for {pairs} pairs");
@@ -117,44 +105,35 @@ fn an_isotropic_body_binds_one_number_for_a_pair_of_nodes() {
     assert!(!is_isotropic && numbers == 9 * pairs, "{numbers} numbers for {pairs} pairs");
 }
 
-/// The method that is chosen for the sphere that ships, 2,562 nodes of which all are drawn, reaches the CPU's frames: a
-/// few dozen iterations leave most of a push out.
+/// The sphere that ships, 2,562 nodes of which all are drawn, reaches the CPU's frames.
 #[test]
 fn the_sphere_that_ships_is_drawn_where_the_cpu_has_it() {
     let scene = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
     let object = Object::build(&scene.object).unwrap();
-    let last = |method| {
-        let worst = std::cell::Cell::new(0.0_f64);
-        frames_of(&object, method, |_, twin, displacement, _| {
-            worst.set(worst.get().max(relative(twin.displacement(), displacement)));
-        });
-        worst.get()
-    };
-    let own = last(FrameMethod::suitable(object.mechanics().unwrap()));
-    // Forty frames of sums of 2,562 terms, rounded by 6e-8 each.
-    assert!(own < 6e-3, "{own}");
-    let few = last(FrameMethod::Iterations(FrameMethod::USUAL_ITERATIONS));
-    assert!(few > 0.1, "{few}: iterations would do");
+    assert!(FrameUpdate::suits(object.mechanics().unwrap()));
+    frames_of(&object, |frame, twin, displacement, _| {
+        // Forty frames of sums of 2,562 terms, rounded by 6e-8 each.
+        let error = relative(twin.displacement(), displacement);
+        assert!(error < 6e-3, "frame {frame}: {error}");
+    });
 }
 
 #[test]
-fn without_forces_the_objects_energy_never_rises_however_few_the_iterations() {
+fn without_forces_the_objects_energy_never_rises() {
     let (_, object, _) = load("sphere.toml");
-    for method in [FrameMethod::Inverse, FrameMethod::Iterations(1), FrameMethod::Iterations(3)] {
-        let before = std::cell::Cell::new(f64::MAX);
-        let greatest = std::cell::Cell::new(0.0f64);
-        frames(method, |frame, _, displacement, velocity| {
-            let now = energy(&object, displacement, velocity);
-            assert!(now.is_finite());
-            greatest.set(greatest.get().max(now));
-            if frame > 15 {
-                // To rounding of what is stored: 1e-6 of it.
-                assert!(now <= before.get() * (1.0 + 1e-6), "{method:?}, frame {frame}: {now} after {}", before.get());
-            }
-            before.set(now);
-        });
-        assert!(greatest.get() > 1e-6 && before.get() < 0.9 * greatest.get(), "{method:?}: it moved, and came to rest");
-    }
+    let before = std::cell::Cell::new(f64::MAX);
+    let greatest = std::cell::Cell::new(0.0f64);
+    frames(|frame, _, displacement, velocity| {
+        let now = energy(&object, displacement, velocity);
+        assert!(now.is_finite());
+        greatest.set(greatest.get().max(now));
+        if frame > 15 {
+            // To rounding of what is stored: 1e-6 of it.
+            assert!(now <= before.get() * (1.0 + 1e-6), "frame {frame}: {now} after {}", before.get());
+        }
+        before.set(now);
+    });
+    assert!(greatest.get() > 1e-6 && before.get() < 0.9 * greatest.get(), "it moved, and came to rest");
 }
 
 #[test]
@@ -169,8 +148,7 @@ fn effects_follow_the_cpus_and_leave_nothing_behind_where_they_are_not_named() {
     let mut costs = Vec::new();
     for effects in [none, gravity, stiffening, both, quasi_static] {
         let mut twin = ObjectMotion::new(&object, period, &effects).unwrap();
-        let method = FrameMethod::Iterations(60);
-        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
+        let mut update = FrameUpdate::new(context(), &object, period, &effects).unwrap();
         let mut forces = vec![DVec3::ZERO; object.rest.len()];
         for frame in 0..20 {
             forces[17] = if frame < 12 { DVec3::new(1.0, -0.5, 2.0) } else { DVec3::ZERO };
@@ -196,14 +174,13 @@ fn effects_follow_the_cpus_and_leave_nothing_behind_where_they_are_not_named() {
 }
 
 #[test]
-fn on_the_gpu_too_effects_never_raise_energy_however_few_the_iterations() {
+fn on_the_gpu_too_effects_never_raise_energy() {
     let (_, object, _) = load("sphere.toml");
     let stiffening = StiffeningSpec { factor: 20.0, strain: 0.01 };
     let effects = GraphicsEffects { stiffening: Some(stiffening), ..GraphicsEffects::default() };
     let law = haptize::object::Stiffening::new(object.mechanics().unwrap(), stiffening.factor, stiffening.strain);
-    let method = FrameMethod::Iterations(2);
     for period in [1e-3, 0.3] {
-        let mut update = FrameUpdate::new(context(), &object, period, method, &effects).unwrap();
+        let mut update = FrameUpdate::new(context(), &object, period, &effects).unwrap();
         let mut forces = vec![DVec3::ZERO; object.rest.len()];
         let (mut before, mut greatest) = (f64::MAX, 0.0_f64);
         for frame in 0..60 {
@@ -225,8 +202,6 @@ fn on_the_gpu_too_effects_never_raise_energy_however_few_the_iterations() {
 fn a_frame_period_that_is_no_time_is_refused() {
     let (_, object, _) = load("sphere.toml");
     for period in [0.0, -0.1, f64::NAN, f64::INFINITY] {
-        assert!(
-            FrameUpdate::new(context(), &object, period, FrameMethod::Inverse, &GraphicsEffects::default()).is_err()
-        );
+        assert!(FrameUpdate::new(context(), &object, period, &GraphicsEffects::default()).is_err());
     }
 }
