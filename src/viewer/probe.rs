@@ -28,6 +28,10 @@ pub fn pick(ray: &Ray, places: &[DVec3], triangles: &[[u32; 3]]) -> Option<usize
     met.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, vertex)| vertex)
 }
 
+/// How far beyond an edge a triangle is still met (1): more than rounding moves a ray, so that none slips between two
+/// triangles.
+const EDGE: f64 = 1e-9;
+
 /// Where `ray` meets a triangle: how far along (m), and the weights of its corners.
 fn meet([a, b, c]: [DVec3; 3], ray: &Ray) -> Option<(f64, [f64; 3])> {
     // a + u (b - a) + v (c - a) = origin + t direction; a ray in the triangle's plane meets it nowhere.
@@ -35,7 +39,7 @@ fn meet([a, b, c]: [DVec3; 3], ray: &Ray) -> Option<(f64, [f64; 3])> {
     let solution = (system.determinant() != 0.0).then(|| system.inverse() * (ray.origin - a))?;
     let [u, v, along] = solution.to_array();
     let weights = [1.0 - u - v, u, v];
-    (along > 0.0 && weights.iter().all(|weight| *weight >= 0.0)).then_some((along, weights))
+    (along > 0.0 && weights.iter().all(|weight| *weight >= -EDGE)).then_some((along, weights))
 }
 
 #[cfg(test)]
