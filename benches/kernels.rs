@@ -228,7 +228,7 @@ fn frames(context: &Arc<Context>, scene: &Scene, rings: usize, adapter: Adapter)
     let object = Object::build(&spec)?;
     let nodes = object.rest.len();
     let forces: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
-    let mut update = FrameUpdate::new(Arc::clone(context), &object, 1.0 / 60.0, &GraphicsEffects::default())?;
+    let mut update = FrameUpdate::new(Arc::clone(context), &object, 1.0 / 60.0)?;
     update.step(&forces)?;
     update.read()?;
     context.kernel_times()?;

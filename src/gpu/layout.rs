@@ -38,7 +38,7 @@ pub struct Parameters {
     pub rounds: u32,
 }
 
-/// `FrameParameters` of `shaders/frame_common.wgsl` (uniform).
+/// `FrameParameters` of `shaders/frame.wgsl` (uniform).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented where the shader reads them")]

@@ -128,7 +128,7 @@ mod tests {
         gpu::{AdapterChoice, Context, FrameUpdate, GpuSolver},
         object::Object,
         proxy::Chain,
-        scene::{ContactLaw, ContactSpec, GraphicsEffects, Scene},
+        scene::{ContactLaw, ContactSpec, Scene},
         sweep::{Backend, sample},
     };
     use glam::DVec3;
@@ -179,8 +179,7 @@ mod tests {
         let (scene, [context, _]) = sphere();
         let object = Object::build(&scene.object).unwrap();
         let forces = vec![DVec3::Z; object.rest.len()];
-        let effects = GraphicsEffects::default();
-        let mut update = FrameUpdate::new(Arc::clone(&context), &object, 1.0 / 60.0, &effects).unwrap();
+        let mut update = FrameUpdate::new(Arc::clone(&context), &object, 1.0 / 60.0).unwrap();
         let begin = Instant::now();
         for _ in 0..2 {
             update.step(&forces).unwrap();
@@ -197,8 +196,7 @@ mod tests {
     fn a_longer_dispatch_takes_longer() {
         let (scene, [context, _]) = sphere();
         let object = Object::build(&scene.object).unwrap();
-        let effects = GraphicsEffects::default();
-        let mut update = FrameUpdate::new(Arc::clone(&context), &object, 1.0 / 60.0, &effects).unwrap();
+        let mut update = FrameUpdate::new(Arc::clone(&context), &object, 1.0 / 60.0).unwrap();
         let mut total = |frames| {
             (0..frames).for_each(|_| update.step(&[]).unwrap());
             update.read().unwrap();

@@ -1,5 +1,5 @@
 //! The object in the window: its nodes advanced by the interpolated contact forces, frame after frame: on the GPU, or on
-//! the CPU where it is too large for that.
+//! the CPU where that moves it no better (see [`FrameUpdate::suits`]), or it relaxes.
 
 use super::{links::filled, loaded::Loaded, probe::Probe, view_renderer::Surface};
 use crate::{
@@ -68,7 +68,7 @@ self_cell::self_cell!(
 /// at 60. A slower one shows it slowed down.
 const MOST_FRAMES: usize = 6;
 
-/// Time after which no further frame is made up for, where the CPU moves a large object: the window goes on answering.
+/// Time after which no further frame is made up for, where the CPU moves the object: the window goes on answering.
 const MOST_TIME: Duration = Duration::from_millis(16);
 
 impl Body {
@@ -85,7 +85,7 @@ impl Body {
         context: &Arc<Context>,
         loaded: &Loaded,
         effects: &GraphicsEffects,
-        suited: fn(&Mechanics) -> bool,
+        suited: fn(&Mechanics, &GraphicsEffects) -> bool,
     ) -> Result<Option<Self>, Error> {
         let (Some(object), Some(contact), Some(graphics)) =
             (&loaded.setup.object, &loaded.forces, &loaded.setup.scene.graphics)
@@ -96,10 +96,8 @@ impl Body {
         let nodes = object.rest.len();
         let graphics = GraphicsSpec { effects: *effects, ..*graphics };
         let period = 1.0 / graphics.rate;
-        let motion = if suited(object.mechanics()?) {
-            let remembers = relaxation.is_some();
-            let device = Arc::clone(context);
-            Motion::Device(Box::new(FrameUpdate::remembering(device, object, period, effects, remembers)?))
+        let motion = if relaxation.is_none() && suited(object.mechanics()?, effects) {
+            Motion::Device(Box::new(FrameUpdate::new(Arc::clone(context), object, period)?))
         } else {
             let moved = MovedObject::try_new(Arc::clone(&loaded.setup), |setup| match &setup.object {
                 Some(object) => ObjectMotion::new(object, period, effects),
@@ -136,7 +134,7 @@ impl Body {
         for _ in 0..(due as usize).min(MOST_FRAMES) {
             let [contact, past] = self.forces.frame();
             match &mut self.motion {
-                Motion::Device(update) => update.step_remembering(contact, past)?,
+                Motion::Device(update) => update.step(contact)?,
                 Motion::Host(host) if began.elapsed() < MOST_TIME => host.step(contact, past),
                 Motion::Host(_) => {}
             }
@@ -295,34 +293,30 @@ mod tests {
         let mut renderer = ViewRenderer::new(Arc::clone(&context), 1).unwrap();
         let q = deepest(&loaded).unwrap();
         let latest = Latest { proxy: q, device: q, share: 1.0, dent: Some(0.0), ..Latest::default() };
-        let gravity = GraphicsEffects { gravity: Some(DVec3::new(0.0, 0.0, -9.81)), ..GraphicsEffects::default() };
-        for effects in [GraphicsEffects::default(), gravity] {
-            // Pictures at rest and pressed, by displacement and by force.
-            let pictures = [true, false].map(|on_device| {
-                let suited = if on_device { |_: &Mechanics| true } else { |_: &Mechanics| false };
-                let mut body = Body::moved(&context, &loaded, &effects, suited).unwrap().unwrap();
-                assert_eq!(matches!(body.motion, Motion::Device(_)), on_device);
-                let mut seen = Vec::new();
-                for elapsed in [0.0, 0.05] {
-                    body.advance(&latest, elapsed).unwrap();
-                    for (quantity, top) in [Quantity::Displacement, Quantity::Force].into_iter().zip(body.extremes) {
-                        let look = Look { background: [0.0; 3], quantity, colour_top: top as f32, edge_width: 0.0 };
-                        let camera = Camera::looking_at(DVec3::ZERO, 0.05);
-                        let picture =
-                            renderer.draw([160, 120], &camera, &look, Some(&body.surface), None, &[]).unwrap();
-                        seen.push(pixels::read(&context, picture).unwrap());
-                    }
+        // Pictures at rest and pressed, by displacement and by force.
+        let suited: [fn(&Mechanics, &GraphicsEffects) -> bool; 2] = [|_, _| true, |_, _| false];
+        let pictures = suited.map(|suited| {
+            let effects = GraphicsEffects::default();
+            let mut body = Body::moved(&context, &loaded, &effects, suited).unwrap().unwrap();
+            let mut seen = Vec::new();
+            for elapsed in [0.0, 0.05] {
+                body.advance(&latest, elapsed).unwrap();
+                for (quantity, top) in [Quantity::Displacement, Quantity::Force].into_iter().zip(body.extremes) {
+                    let look = Look { background: [0.0; 3], quantity, colour_top: top as f32, edge_width: 0.0 };
+                    let camera = Camera::looking_at(DVec3::ZERO, 0.05);
+                    let picture = renderer.draw([160, 120], &camera, &look, Some(&body.surface), None, &[]).unwrap();
+                    seen.push(pixels::read(&context, picture).unwrap());
                 }
-                seen
-            });
-            let apart = |a: &[u8], b: &[u8]| a.iter().zip(b).filter(|(a, b)| a.abs_diff(**b) > 2).count();
-            let [device, host] = &pictures;
-            for (device, host) in device.iter().zip(host) {
-                // A pixel on an edge may fall to either side: f32 differs by a part in 1e6.
-                assert!(apart(device, host) < device.len() / 1000, "{effects:?}");
             }
-            // Either picture changes where the arm presses, by much more.
-            assert!((0..2).all(|k| apart(&host[k], &host[k + 2]) > host[k].len() / 100), "{effects:?}");
+            (matches!(body.motion, Motion::Device(_)), seen)
+        });
+        let apart = |a: &[u8], b: &[u8]| a.iter().zip(b).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+        let [(true, device), (false, host)] = &pictures else { panic!("one on each") };
+        for (device, host) in device.iter().zip(host) {
+            // A pixel on an edge may fall to either side: f32 differs by a part in 1e6.
+            assert!(apart(device, host) < device.len() / 1000);
         }
+        // Either picture changes where the arm presses, by much more.
+        assert!((0..2).all(|k| apart(&host[k], &host[k + 2]) > host[k].len() / 100));
     }
 }
