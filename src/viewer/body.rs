@@ -154,7 +154,7 @@ impl Body {
     /// How far its nodes are from their places at rest (m). Waits for the device that moves them.
     fn displacements(&self) -> Result<Vec<DVec3>, GpuError> {
         match &self.motion {
-            Motion::Device(update) => update.drawn(),
+            Motion::Device(update) => update.read().map(|(displacements, _)| displacements),
             Motion::Host(host) => Ok(host.moved.borrow_dependent().displacements().collect()),
         }
     }
