@@ -465,10 +465,12 @@ impl Describe for IdentifiedFriction {
         text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes{builds_up}"));
         for (joint, [with, without]) in predicted.iter().enumerate() {
             let joint = joint + 1;
+            let left_out = if with < without { "" } else { ": it has none" };
             text.row(
                 "",
                 format_args!(
-                    "joint {joint}: held-out strokes predicted to {with:.4} rms, without friction to {without:.4}"
+                    "joint {joint}: held-out strokes predicted to {with:.4} rms, without friction to \
+                     {without:.4}{left_out}"
                 ),
             );
         }
