@@ -154,7 +154,7 @@ impl Body {
     /// How far its nodes are from their places at rest (m). Waits for the device that moves them.
     fn displacements(&self) -> Result<Vec<DVec3>, GpuError> {
         match &self.motion {
-            Motion::Device(update) => update.drawn(),
+            Motion::Device(update) => update.read().map(|(displacements, _)| displacements),
             Motion::Host(host) => Ok(host.moved.borrow_dependent().displacements().collect()),
         }
     }
@@ -303,8 +303,7 @@ mod tests {
                 body.advance(&latest, elapsed).unwrap();
                 for (quantity, top) in [Quantity::Displacement, Quantity::Force].into_iter().zip(body.extremes) {
                     let ground = (-1.0, [0.0; 3]);
-                    let look =
-                        Look { background: [0.0; 3], quantity, colour_top: top as f32, edge_width: 0.0, ground };
+                    let look = Look { background: [0.0; 3], quantity, colour_top: top as f32, edge_width: 0.0, ground };
                     let camera = Camera::looking_at(DVec3::ZERO, 0.05);
                     let picture =
                         renderer.draw([160, 120], &camera, &look, Some(&body.surface), None, (&[], 0)).unwrap();
