@@ -19,7 +19,7 @@ def run(command: str, *files: str | PathLike[str], **options: Any) -> dict[str, 
     """
     # By the paths of this process: `-m` would look in the current folder first.
     program = f"import sys; sys.path[:] = {sys.path!r}; from haptize.__main__ import main; main()"
-    line = [sys.executable, "-c", program, command, *map(fspath, files), "--json"]
+    line = [sys.executable, "-c", program, command, *(fspath(file) for file in files), "--json"]
     for name, value in options.items():
         for one in value if isinstance(value, (list, tuple)) else [value]:
             if one is not None and one is not False:

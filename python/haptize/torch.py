@@ -38,4 +38,5 @@ class Field(ArrayField, torch.nn.Module):
 
     def forward(self, q: torch.Tensor) -> torch.Tensor:
         """Torque on the arm (N m; N at prismatic joints), of the shape of q."""
-        return self.torque(q)
+        torque: torch.Tensor = self.torque(q)
+        return torque
