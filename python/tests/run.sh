@@ -6,7 +6,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 place=$(mktemp -d)
-trap 'rm -rf "$place" LICENSE-THIRD-PARTY' EXIT
+licences=$PWD/LICENSE-THIRD-PARTY
+trap 'rm -rf "$place" "$licences"' EXIT
 
 # Interpreters that the wheel is for, oldest first: those on the path, and those that pyenv keeps.
 pythons() {
@@ -51,7 +52,7 @@ if [ -n "$twice" ]; then
 fi
 
 # The texts of the licences of all that is compiled in, as the wheels of a release have them.
-"$newest" ../.ci/notices.py haptize-python > LICENSE-THIRD-PARTY
+"$newest" ../.ci/notices.py haptize-python > "$licences"
 # The profile and the features of the tests, so that what they have compiled is used.
 "$place/build/bin/maturin" build --quiet --locked --profile dev --features as-tested --compatibility linux --auditwheel skip --compression-method stored --out "$place"
 wheel=$(ls "$place"/haptize-*.whl)
