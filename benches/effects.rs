@@ -14,20 +14,14 @@
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 
 use haptize::{
-    Error, JointVector,
+    JointVector,
     dataset::Dataset,
     device::Motion,
-    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate},
-    render::{
-        graphics::{ContactForces, DrawnForces, Graphics},
-        haptic::Inputs,
-        session::Latest,
-        setup::Setup,
-    },
+    render::{graphics::Graphics, haptic::Inputs, session::Latest, setup::Setup},
     scene::{EFFECTS, Effect, Scene},
     sweep::baked,
 };
-use std::{path::Path, sync::Arc, time::Instant};
+use std::{path::Path, time::Instant};
 
 /// Rounds of bakes, of ticks and of frames.
 const BAKES: usize = 5;
@@ -81,27 +75,14 @@ fn main() {
         let Some(graphics) = &mut drawn[k] else { return Vec::new() };
         places.iter().map(|(q, share)| timed(|| graphics.frame(&latest(q, *share))).0).collect()
     });
-    let mut bodies = match Context::open(AdapterChoice::Any) {
-        Ok(context) => Body::all(&Arc::new(context), &setups, &datasets).unwrap(),
-        Err(error) => {
-            println!("frames on a GPU are not measured: {error}");
-            variants.iter().map(|_| None).collect()
-        }
-    };
-    let gpu_frames = in_turns(ROUNDS, count, |k| {
-        bodies[k].as_mut().map(|body| timed(|| body.play(&places).unwrap()).0).into_iter().collect()
-    });
     let bytes: Vec<f64> = datasets.iter().map(|dataset| dataset.summary().bytes as f64).collect();
     println!("plain: {:.2} s a bake, {:.0} bytes", bakes[PLAIN], bytes[PLAIN]);
     println!("plain: {:.2} us a tick", 1e6 * ticks[PLAIN] / (1e3 * motion.duration()));
-    let [frame, gpu_frame] = [&frames, &gpu_frames].map(|times| 1e3 * times[GRAPHICS] / FRAMES as f64);
-    println!("graphics: {frame:.3} ms a frame on the CPU, {gpu_frame:.3} ms on the GPU\n");
-    println!("| | bake | tick | frame, CPU | frame, GPU | dataset |\n|---|---|---|---|---|---|");
+    println!("graphics: {:.3} ms a frame\n", 1e3 * frames[GRAPHICS] / FRAMES as f64);
+    println!("| | bake | tick | frame | dataset |\n|---|---|---|---|---|");
     for Row { name, alone, within } in rows {
         print!("| {name} |");
-        for (costs, baseline) in
-            [(&bakes, PLAIN), (&ticks, PLAIN), (&frames, GRAPHICS), (&gpu_frames, GRAPHICS), (&bytes, PLAIN)]
-        {
+        for (costs, baseline) in [(&bakes, PLAIN), (&ticks, PLAIN), (&frames, GRAPHICS), (&bytes, PLAIN)] {
             let ratio = |[k, baseline]: [usize; 2]| costs[k] / costs[baseline];
             match (costs[alone] > 0.0, within) {
                 (false, _) => print!(" |"),
@@ -182,49 +163,6 @@ fn felt(setup: &Setup, motion: &Motion) -> Vec<f64> {
 /// The tick before a frame, with the proxy at `q`.
 fn latest(q: &JointVector, share: f64) -> Latest {
     Latest { proxy: *q, share, dent: Some(0.0), ..Latest::default() }
-}
-
-/// The object of one variant on the GPU: forces are interpolated and smoothed by the host.
-struct Body {
-    contact: ContactForces,
-    forces: DrawnForces,
-    update: FrameUpdate,
-}
-
-impl Body {
-    /// One per variant; none without graphics.
-    fn all(context: &Arc<Context>, setups: &[Setup], datasets: &[Dataset]) -> Result<Vec<Option<Self>>, Error> {
-        let body = |(setup, dataset): (&Setup, &Dataset)| {
-            let (Some(object), Some(graphics)) = (&setup.object, &setup.scene.graphics) else { return Ok(None) };
-            let relaxation = setup.scene.haptics.relaxation.as_ref();
-            let (nodes, period, method) =
-                (object.rest.len(), 1.0 / graphics.rate, FrameMethod::suitable(object.mechanics()?));
-            Ok(Some(Self {
-                contact: ContactForces::new(dataset, nodes).unwrap(),
-                forces: DrawnForces::new(nodes, graphics, relaxation),
-                update: FrameUpdate::remembering(
-                    Arc::clone(context),
-                    object,
-                    period,
-                    method,
-                    &graphics.effects,
-                    relaxation.is_some(),
-                )?,
-            }))
-        };
-        setups.iter().zip(datasets).map(body).collect()
-    }
-
-    /// A frame for each of `places`, and a wait for the last.
-    fn play(&mut self, places: &[Place]) -> Result<(), Error> {
-        for (q, share) in places {
-            self.forces.touch(&self.contact, &latest(q, *share));
-            let [contact, past] = self.forces.frame();
-            self.update.step_remembering(contact, past)?;
-        }
-        self.update.read()?;
-        Ok(())
-    }
 }
 
 /// Time that `work` takes (s), and what it made.

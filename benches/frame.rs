@@ -1,6 +1,6 @@
-//! What one frame of the object in motion costs at 10,000 and 100,000 nodes. On the CPU: isotropic springs, which are
-//! solved coordinate by coordinate, beside axial ones, which need the whole matrix; and the time and memory of what is
-//! made once. On the GPU, where there is one: conjugate gradients, as many iterations as usual and a quarter of them.
+//! What one frame of the object in motion costs at 10,000 and 100,000 nodes, which the CPU moves: isotropic springs, which
+//! are solved coordinate by coordinate, beside axial ones, which need the whole matrix; and the time and memory of what
+//! is made once.
 //! Before that, what substitution with the factor takes of it (`src/object/substitution.rs`), beside faer's own solve.
 //!
 //!     cargo bench --bench frame
@@ -18,7 +18,6 @@ use faer::{
 };
 use glam::DVec3;
 use haptize::{
-    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate},
     object::Object,
     render::object_motion::ObjectMotion,
     scene::{
@@ -26,7 +25,7 @@ use haptize::{
         StiffeningSpec,
     },
 };
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 /// Frames a figure is taken from.
 const FRAMES: usize = 40;
@@ -164,40 +163,6 @@ fn main() {
                     "{nodes:7}  {kind:9}  {name:12}  {built:9.2}  {set_up:10.2}  {megabytes:11.1}  {frame:12.2}, \
                      {median:6.1}, {late:7.1}  {ratio:14.1}"
                 );
-            }
-        }
-    }
-    on_the_gpu();
-}
-
-/// Time that passes for a frame on the GPU, the last one waited for.
-fn on_the_gpu() {
-    let context = match Context::open(AdapterChoice::Any) {
-        Ok(context) => Arc::new(context),
-        Err(error) => return println!("\nframes on the GPU skipped: {error}"),
-    };
-    // A software adapter takes seconds a frame, and its figures say little.
-    let frames = if context.adapter().hardware { FRAMES } else { 2 };
-    println!("\n{}\n  nodes  springs    iterations  memory [MB]  frame [ms]", context.adapter().name);
-    for rings in RINGS {
-        for kind in [SpringKind::Isotropic, SpringKind::Axial] {
-            let object = sphere(kind, rings);
-            let nodes = object.rest.len();
-            let forces: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
-            for iterations in [FrameMethod::USUAL_ITERATIONS / 4, FrameMethod::USUAL_ITERATIONS] {
-                let method = FrameMethod::Iterations(iterations);
-                let effects = GraphicsEffects::default();
-                let mut update = FrameUpdate::new(context.clone(), &object, 1.0 / 60.0, method, &effects).unwrap();
-                update.step(&forces).unwrap();
-                update.read().unwrap();
-                let began = Instant::now();
-                for _ in 0..frames {
-                    update.step(&forces).unwrap();
-                }
-                update.read().unwrap();
-                let frame = 1e3 * began.elapsed().as_secs_f64() / frames as f64;
-                let (kind, megabytes) = (format!("{kind:?}"), update.takes().bytes as f64 * 1e-6);
-                println!("{nodes:7}  {kind:9}  {iterations:10}  {megabytes:11.1}  {frame:10.2}");
             }
         }
     }

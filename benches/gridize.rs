@@ -32,8 +32,13 @@ fn compare(name: &str, point: fn(usize) -> [f64; 3]) {
         torques: tau.iter().flat_map(|&tau| [tau; 3]).collect(),
         deviations: None,
     };
-    let options =
-        GridizeOptions { steps: vec![STEP], epsilon: Some(0.0), interpolation: Interpolation::Linear, smooth: false };
+    let options = GridizeOptions {
+        steps: vec![STEP],
+        epsilon: Some(0.0),
+        interpolation: Interpolation::Linear,
+        smooth: false,
+        within: f64::INFINITY,
+    };
     let start = Instant::now();
     let Ok((dataset, _)) = gridize(&samples, &options) else { return println!("{name}: refused") };
     let seconds = start.elapsed().as_secs_f64();

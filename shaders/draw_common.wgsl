@@ -16,9 +16,16 @@ struct View {
     triangles: u32,
     // 0: the surface is coloured by displacement, 1: by contact force.
     quantity: u32,
+    // Colour that takes the place of all others, and how much of it: 1 in the shadow.
+    shade: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
+
+// What a fragment of this colour shows.
+fn shown(colour: vec3<f32>) -> vec4<f32> {
+    return vec4<f32>(mix(colour, view.shade.rgb, view.shade.a), 1.0);
+}
 
 // Key light, fill from the opposite side, light from above, and a soft highlight.
 fn lit(colour: vec3<f32>, normal: vec3<f32>, to_eye: vec3<f32>) -> vec3<f32> {

@@ -25,5 +25,5 @@ fn vertex(
 @fragment
 fn fragment(in: Corner) -> @location(0) vec4<f32> {
     let shaded = lit(in.colour, normalize(in.normal), normalize(view.eye.xyz - in.position));
-    return vec4<f32>(shaded, 1.0);
+    return shown(shaded);
 }

@@ -49,5 +49,5 @@ fn vertex(@location(3) unit: vec4<f32>, instance: Instance) -> Corner {
 fn fragment(in: Corner) -> @location(0) vec4<f32> {
     let normal = normalize(in.normal);
     let shaded = lit(in.colour.rgb, normal, normalize(view.eye.xyz - in.position));
-    return vec4<f32>(mix(in.colour.rgb, shaded, in.colour.a), 1.0);
+    return shown(mix(in.colour.rgb, shaded, in.colour.a));
 }

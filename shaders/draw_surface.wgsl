@@ -70,5 +70,5 @@ fn fragment(in: Corner) -> @location(0) vec4<f32> {
         let nearest = min(distance.x, min(distance.y, distance.z));
         colour = mix(colour * 0.78, colour, smoothstep(view.edge_width - 0.5, view.edge_width + 0.5, nearest));
     }
-    return vec4<f32>(colour, 1.0);
+    return shown(colour);
 }

@@ -50,6 +50,14 @@ impl JointVector {
         self.iter().zip(other).map(|(a, b)| a * b).sum()
     }
 
+    /// `factor` times the vector.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let mut scaled = *self;
+        scaled.iter_mut().for_each(|entry| *entry *= factor);
+        scaled
+    }
+
     /// The same direction, no longer than `greatest`.
     #[must_use]
     pub fn shortened(&self, greatest: f64) -> Self {

@@ -14,10 +14,11 @@ use std::time::SystemTime;
 /// grid's step (rad; m), one number or one per joint. deviations: standard deviation of each torque, the same shape.
 /// names, units ("rad" or "m"): of the joints. epsilon: torque above which a configuration counts as contact (N m).
 /// smooth: smooth torques within their deviation first. interpolation: "linear", or "natural" for two joints.
+/// within: distance from the samples at which the measured region ends inside their hull, too, in spacings.
 #[pyfunction]
 #[pyo3(signature = (
     q, tau, step, *, deviations = None, names = None, units = None, epsilon = None, smooth = false,
-    interpolation = "linear"
+    interpolation = "linear", within = library::WITHIN
 ))]
 #[allow(clippy::too_many_arguments)] // As many as Python's caller may name.
 pub fn gridize(
@@ -31,6 +32,7 @@ pub fn gridize(
     epsilon: Option<f64>,
     smooth: bool,
     interpolation: &str,
+    within: f64,
 ) -> PyResult<Dataset> {
     let interpolation = match interpolation {
         "linear" => Interpolation::Linear,
@@ -61,7 +63,7 @@ pub fn gridize(
     }
     let joints = names.into_iter().zip(units).map(|(name, unit)| JointLabel { name, unit }).collect();
     let samples = Samples { joints, configurations, torques, deviations };
-    let options = GridizeOptions { steps: arrays::numbers(step)?.0, epsilon, interpolation, smooth };
+    let options = GridizeOptions { steps: arrays::numbers(step)?.0, epsilon, interpolation, smooth, within };
     let gridized = threads::detach(py, || library::gridize(&samples, &options))?;
     let (mut dataset, report) = gridized.map_err(|error| errors::gridize(&error))?;
     dataset.provenance.backend = "import".into();

@@ -12,7 +12,7 @@ use crate::{
     Error, MAX_AXES,
     dataset::{Axis, Dataset, IdentifiedFriction, IdentifiedRelaxation, Provenance},
     gridize::{
-        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Reversals, Samples, gridize,
+        ForceHistory, GridizeOptions, GridizeReport, Interpolation, Past, Reversals, Samples, WITHIN, gridize,
         gridize_remembering, gridize_sliding, predict_histories,
         prediction::{Prediction, held_out, predict},
     },
@@ -69,14 +69,14 @@ pub struct Arguments {
     #[arg(long)]
     topic: Option<String>,
     /// Meaning of the efforts of an MCAP file, without --columns: the torque of the motors, or that of the contact on
-    /// the arm. They must hold no weight of the arm.
+    /// the arm. The arm's weight must have been subtracted.
     #[arg(long, default_value = "motor", conflicts_with = "columns")]
     effort: Effort,
     /// A scene with the arm and the gains to feel the dataset with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Torque above which a configuration counts as contact (N m); by default what the scan's scene says, three
-    /// standard deviations of the samples, or a hundredth of the greatest torque.
+    /// Torque above which a configuration counts as contact (N m). By default that of the scan's scene; without one three
+    /// standard deviations of the samples, where these are known; else a hundredth of the greatest torque.
     #[arg(long, allow_negative_numbers = true)]
     epsilon: Option<f64>,
     /// How torques are interpolated.
@@ -85,8 +85,12 @@ pub struct Arguments {
     /// Smooth torques within their measured standard deviation first.
     #[arg(long)]
     smooth: bool,
-    /// Measure how well the dataset predicts measurements: this fraction of the samples is left out of a second one,
-    /// which has to predict them.
+    /// Distance from the samples at which the measured region ends inside their convex hull, too, in spacings of the samples;
+    /// `inf` for the hull alone.
+    #[arg(long, default_value_t = WITHIN, value_name = "SPACINGS", allow_negative_numbers = true)]
+    within: f64,
+    /// Measure how well the dataset predicts measurements: a second one is made without this fraction of the samples, and
+    /// its errors there are stated.
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true, value_parser = super::fraction)]
     held_out: Option<f64>,
     /// Measure how well the dataset predicts other logs of the same object.
@@ -180,6 +184,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         epsilon: arguments.epsilon.or(source.epsilon),
         interpolation: arguments.interpolation,
         smooth: arguments.smooth,
+        within: arguments.within,
     };
     let (dataset, report) = source.gridize(&options)?;
     if report.inside == 0 {
@@ -212,6 +217,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         report,
         file: output.display().to_string(),
         source: source.kind,
+        within: arguments.within,
         seconds: started.elapsed().as_secs_f64(),
         import: source.import,
         left_out: source.left_out,
@@ -244,6 +250,8 @@ struct Gridized {
     file: String,
     /// `scan`, `simulated scan` or `import`.
     source: &'static str,
+    /// Distance from the samples at which the measured region ends, in their spacings (1).
+    within: f64,
     /// Wall time, and the part of it for reading (s).
     seconds: f64,
     #[serde(skip)]
@@ -457,10 +465,13 @@ impl Describe for IdentifiedFriction {
         text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes{builds_up}"));
         for (joint, [with, without]) in predicted.iter().enumerate() {
             let joint = joint + 1;
+            let left_out = if with < without { "" } else { ": it has none" };
             text.row(
                 "",
                 format_args!(
-                    "joint {joint}: held-out strokes predicted to {with:.4} rms, without friction to {without:.4}"
+                    "joint {joint}: held-out strokes predicted to {} rms, without friction to {}{left_out}",
+                    coarse(*with),
+                    coarse(*without)
                 ),
             );
         }
@@ -469,8 +480,8 @@ impl Describe for IdentifiedFriction {
 
 impl Describe for Gridized {
     fn describe(&self, text: &mut Text) {
-        let Self { file, source, of, seconds, reading, import, left_out, .. } = self;
-        let GridizeReport { samples, merged, points, inside, contact_points, epsilon, .. } = &self.report;
+        let Self { file, source, of, seconds, reading, import, left_out, within, .. } = self;
+        let GridizeReport { samples, merged, points, inside, contact_points, epsilon, far, spacing } = &self.report;
         text.line(format_args!("{file}: {inside} grid points of {points} inside the measured region"));
         text.row("made from", format_args!("{samples} samples ({source}: {of})"));
         if *merged > 0 {
@@ -480,7 +491,23 @@ impl Describe for Gridized {
             [first, others @ ..] if others.iter().all(|axis| axis.unit == first.unit) => first.effort_unit(),
             _ => "N m or N",
         };
-        text.row("in contact", format_args!("{contact_points} points, torque above {epsilon:.4} {unit}"));
+        if *far > 0 {
+            let mut spacings: Vec<String> = Vec::new();
+            for (spacing, axis) in spacing.iter().zip(&self.axes) {
+                let told = format!("{} {}", coarse(within * spacing), axis.unit);
+                if !spacings.contains(&told) {
+                    spacings.push(told);
+                }
+            }
+            text.row(
+                "far",
+                format_args!(
+                    "{far} grid points between the samples are left out: more than {within} spacings ({}) from any",
+                    spacings.join(", ")
+                ),
+            );
+        }
+        text.row("in contact", format_args!("{contact_points} points, torque above {} {unit}", coarse(*epsilon)));
         if *left_out > 0 {
             text.row("left out", watch::counted(*left_out, ["row", "rows"]));
         }
@@ -496,9 +523,10 @@ impl Describe for Gridized {
                 self.axes.iter().zip(cells.hysteresis.iter().zip(&cells.repeatability))
             {
                 let unit = axis.effort_unit();
+                let [hysteresis, repeatability] = [hysteresis, repeatability].map(|x| coarse(*x));
                 text.row(
                     &axis.name,
-                    format_args!("hysteresis +-{hysteresis:.4} {unit}, repeatability {repeatability:.4} {unit}"),
+                    format_args!("hysteresis +-{hysteresis} {unit}, repeatability {repeatability} {unit}"),
                 );
             }
         }
@@ -506,11 +534,12 @@ impl Describe for Gridized {
             let Some(Prediction { samples, predicted, rms, worst, deviation }) = prediction else { continue };
             text.row(what, format_args!("{samples} samples, {predicted} of them inside the grid and predicted"));
             for (joint, axis) in self.axes.iter().enumerate().filter(|_| *predicted > 0) {
-                let own = deviation.as_ref().map(|own| format!("; their own standard deviation {:.4}", own[joint]));
-                let repeated = cells.map(|cells| format!(", repeatability {:.4}", cells.repeatability[joint]));
+                let own =
+                    deviation.as_ref().map(|own| format!("; their own standard deviation {}", coarse(own[joint])));
+                let repeated = cells.map(|cells| format!(", repeatability {}", coarse(cells.repeatability[joint])));
                 let beside: String = own.into_iter().chain(repeated).collect();
-                let (rms, worst, unit) = (rms[joint], worst[joint], axis.effort_unit());
-                text.row(&axis.name, format_args!("to {rms:.4} {unit} rms, {worst:.4} at worst{beside}"));
+                let (rms, worst, unit) = (coarse(rms[joint]), coarse(worst[joint]), axis.effort_unit());
+                text.row(&axis.name, format_args!("to {rms} {unit} rms, {worst} at worst{beside}"));
             }
         }
         self.relaxation.describe(text);

@@ -5,6 +5,7 @@ use super::{
     report::{Describe, Report, Text},
     shell, tell,
 };
+use crate::MAX_AXES;
 use crate::dataset::replace_file;
 use crate::names::escaped;
 use crate::urdf::{self, Arm, ArmJoint, Lock, Robot};
@@ -27,12 +28,14 @@ pub struct Arguments {
     /// The link at the end of the arm; its chain to the root becomes the arm.
     #[arg(long, value_name = "LINK")]
     tip: String,
-    /// Hold a joint at a value (rad or m); a scene has at most six that move. May be given several times.
+    /// Hold a joint at a value (rad or m); a scene has at most twelve that move, and six if it is to be baked. May be
+    /// given several times.
     #[arg(long, value_name = "JOINT=VALUE", value_parser = lock, allow_hyphen_values = true)]
     lock: Vec<Lock>,
-    /// Least distance between contact nodes on the links' shapes (m).
-    #[arg(long, default_value_t = 0.005, value_name = "METRES", allow_negative_numbers = true)]
-    spacing: f64,
+    /// Least distance between contact nodes on the links' shapes (m); by default 0.005, or as much as keeps them below
+    /// 4,096.
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    spacing: Option<f64>,
     /// Folder that holds the ROS packages that `package://` names, if they are in no folder above the robot's file.
     #[arg(long, value_name = "DIR")]
     package_path: Option<PathBuf>,
@@ -100,7 +103,9 @@ impl Describe for Imported {
             let ([lower, upper], kind) = (joint.limits, format!("{:?}", joint.kind).to_lowercase());
             text.row(&joint.name, format_args!("{kind:9} {lower:8.3} to {upper:.3}, {count} nodes"));
         }
-        text.row("next", format_args!("haptize bake {}", shell::file(Path::new(file))));
+        // More joints than a grid has axes are felt live.
+        let command = if joints.len() > MAX_AXES { "view" } else { "bake" };
+        text.row("next", format_args!("haptize {command} {}", shell::file(Path::new(file))));
     }
 }
 
@@ -111,8 +116,11 @@ fn command(arguments: &Arguments) -> String {
     for Lock { joint, value } in &arguments.lock {
         command += &format!(" {}", shell::option("--lock", &format!("{joint}={value}")));
     }
+    if let Some(spacing) = arguments.spacing {
+        command += &format!(" --spacing {spacing}");
+    }
     // It stays on one line.
-    escaped(&format!("{command} --spacing {}", arguments.spacing)).into_owned()
+    escaped(&command).into_owned()
 }
 
 /// Refuses a scene that is there, before the work that makes another.

@@ -225,13 +225,16 @@ fn outside(chain: &Chain, grid: &GridSpec, q: &[f64]) -> Vec<String> {
 impl Describe for Inspected {
     fn describe(&self, text: &mut Text) {
         let Inspection { q, status, iterations, residual, energy, gap, torque, .. } = &self.solved;
-        let Inspection { proxy_nodes, object_nodes, .. } = &self.solved;
+        let Inspection { proxy_nodes, object_nodes, dent, .. } = &self.solved;
         let efforts =
             |values: &[f64]| scene::efforts(values, self.joints.iter().map(|(name, unit)| (name.as_str(), *unit)));
         text.line(format_args!("q = {}: {status}", numbers(q)));
         text.row("torque", efforts(torque));
         text.row("energy", format_args!("{energy:.6} J"));
         text.row("gap", format_args!("{:.3} mm to the surface at rest", gap * 1e3));
+        if let Some(dent) = dent {
+            text.row("dent", format_args!("{:.1} mm, over which an arm that slides leaves it", dent * 1e3));
+        }
         text.row("solved", format_args!("in {iterations} iterations to a residual of {residual:.1e}"));
         let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
         text.line(format_args!(

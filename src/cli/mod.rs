@@ -5,7 +5,7 @@
 //!   text;
 //! - `pub fn run(arguments: &Arguments) -> Result<Report, Failure>`: its work.
 //!
-//! and three lines here: `mod name;`, a variant of `Command` and an arm of `Command::run`. A subcommand appears
+//! and two lines here: `mod name;` and one of `commands`. A subcommand appears
 //! here only once it works. It never prints its result itself: it returns a `Report` of one value that is both described
 //! and serialised, and `--json` (an option of every subcommand) decides here which of the two goes to standard output.
 //! Notes and progress go to standard error.
@@ -16,7 +16,7 @@
 /// Which adapter draws and computes, for the help of commands that use one.
 macro_rules! adapter_help {
     () => {
-        "\n\nWith several GPUs the first that `haptize doctor` lists draws, and all of the best kind solve. Set \
+        "\n\nWith several GPUs the first that `haptize doctor` lists draws, and all of the fastest kind solve. Set \
          WGPU_ADAPTER_NAME to parts of their names or to their addresses, with commas between, to choose others: \
          \"RTX 4090\", \"01:00.0,02:00.0\"."
     };
@@ -96,89 +96,77 @@ struct CommandLine {
     /// Print one machine-readable JSON object on standard output.
     #[arg(long, global = true)]
     json: bool,
-    /// Replace files that haptize did not write, too.
+    /// Replace existing files even if haptize did not write them.
     #[arg(long, global = true)]
     force: bool,
-    /// Neither use nor keep what earlier commands computed of the same body.
+    /// Ignore what earlier commands kept of the same body, and keep nothing.
     #[arg(long, global = true)]
     no_cache: bool,
 }
 
-#[derive(Subcommand)]
-enum Command {
-    /// Measure what accuracy costs in time: error against spacing, interpolation, tolerance and more, with figures.
-    Accuracy(accuracy::Arguments),
-    /// Solve contact at every point of a scene's grid and write the dataset.
-    Bake(bake::Arguments),
-    /// Print the completion script of a shell.
-    Completions(completions::Arguments),
-    /// List real haptic devices, and run one carefully for the first time.
-    Device(device::Arguments),
-    /// Report what this machine offers: threads, graphics adapters, real-time priority.
-    Doctor(doctor::Arguments),
-    /// Convert a dataset for other programs.
-    Export(export::Arguments),
-    /// Interpolate scattered measurements onto a grid: a scan's log, or tables of joint positions and torques.
-    Gridize(gridize::Arguments),
-    /// Turn a robot file (URDF) into a scene: its joints, inertias and shapes, before a soft ball.
-    Import(import::Arguments),
-    /// Check a dataset and summarise it.
-    Info(info::Arguments),
-    /// Solve one configuration and print every detail, beside what a dataset interpolates there.
-    Inspect(inspect::Arguments),
-    /// Write the manual pages.
-    Man(man::Arguments),
-    /// Put the shards of a bake together into its dataset.
-    Merge(merge::Arguments),
-    /// Write a commented scene to begin with.
-    New(new::Arguments),
-    /// Remake the figures and numbers of the paper, with a table that compares them.
-    Paper(paper::Arguments),
-    /// Put the tip of an arm before an object, and find a grid and a press there.
-    Place(place::Arguments),
-    /// State what the shards of a bake take, with lines for job schedulers.
-    Plan(plan::Arguments),
-    /// Feel a dataset with a simulated hand or a real device: traces and figures.
-    Play(play::Arguments),
-    /// Find where contact is, before anything is baked: ranges, depth, and what a grid over them takes.
-    Reach(reach::Arguments),
-    /// Measure a real object by touching it with a rig (the rig that ships is simulated).
-    Scan(scan::Arguments),
-    /// Find the surface of a scanned object from the log of its scan.
-    Shape(shape::Arguments),
-    /// Make a scene of what was scanned: an elastic object that explains the log of its scan.
-    Twin(twin::Arguments),
-    /// Open a dataset or a scene in a window.
-    View(view::Arguments),
+/// The subcommands, each with the module of its arguments and its work.
+macro_rules! commands {
+    ($($(#[$help:meta])* $name:ident: $module:ident;)*) => {
+        #[derive(Subcommand)]
+        enum Command {
+            $($(#[$help])* $name($module::Arguments),)*
+        }
+
+        impl Command {
+            fn run(&self) -> Result<Report, Failure> {
+                match self {
+                    $(Self::$name(arguments) => $module::run(arguments),)*
+                }
+            }
+        }
+    };
 }
 
-impl Command {
-    fn run(&self) -> Result<Report, Failure> {
-        match self {
-            Self::Accuracy(arguments) => accuracy::run(arguments),
-            Self::Bake(arguments) => bake::run(arguments),
-            Self::Completions(arguments) => completions::run(arguments),
-            Self::Device(arguments) => device::run(arguments),
-            Self::Doctor(arguments) => doctor::run(arguments),
-            Self::Export(arguments) => export::run(arguments),
-            Self::Gridize(arguments) => gridize::run(arguments),
-            Self::Import(arguments) => import::run(arguments),
-            Self::Info(arguments) => info::run(arguments),
-            Self::Inspect(arguments) => inspect::run(arguments),
-            Self::Man(arguments) => man::run(arguments),
-            Self::Merge(arguments) => merge::run(arguments),
-            Self::New(arguments) => new::run(arguments),
-            Self::Paper(arguments) => paper::run(arguments),
-            Self::Place(arguments) => place::run(arguments),
-            Self::Plan(arguments) => plan::run(arguments),
-            Self::Play(arguments) => play::run(arguments),
-            Self::Reach(arguments) => reach::run(arguments),
-            Self::Scan(arguments) => scan::run(arguments),
-            Self::Shape(arguments) => shape::run(arguments),
-            Self::Twin(arguments) => twin::run(arguments),
-            Self::View(arguments) => view::run(arguments),
-        }
-    }
+commands! {
+    /// Measure error and computing time for many grids, interpolations and tolerances, with figures.
+    Accuracy: accuracy;
+    /// Solve contact at every point of a scene's grid and write the dataset.
+    Bake: bake;
+    /// Print the completion script of a shell.
+    Completions: completions;
+    /// List real haptic devices, and run one carefully for the first time.
+    Device: device;
+    /// Report what this machine offers: threads, graphics adapters, real-time priority.
+    Doctor: doctor;
+    /// Convert a dataset for other programs.
+    Export: export;
+    /// Interpolate scattered measurements onto a grid: a scan's log, or tables of joint positions and torques.
+    Gridize: gridize;
+    /// Turn a robot file (URDF) into a scene: its joints, inertias and shapes, before a soft ball.
+    Import: import;
+    /// Check a dataset and summarise it.
+    Info: info;
+    /// Solve one configuration and print every detail, beside what a dataset interpolates there.
+    Inspect: inspect;
+    /// Write the manual pages.
+    Man: man;
+    /// Join the shards of a bake into one dataset.
+    Merge: merge;
+    /// Write a commented scene to begin with.
+    New: new;
+    /// Remake the figures and numbers of the paper, and compare them with the published ones.
+    Paper: paper;
+    /// Put the tip of an arm before an object, and find a grid and a press there.
+    Place: place;
+    /// Estimate time and memory of each shard of a bake, with lines for job schedulers.
+    Plan: plan;
+    /// Feel a dataset with a simulated hand or a real device: traces and figures.
+    Play: play;
+    /// Find where contact is, before anything is baked: ranges, depth, and what a grid over them takes.
+    Reach: reach;
+    /// Measure a real object by touching it with a rig (the rig that ships is simulated).
+    Scan: scan;
+    /// Find the surface of a scanned object from the log of its scan.
+    Shape: shape;
+    /// Make a scene of what was scanned: an elastic object that answers with the torques of the log.
+    Twin: twin;
+    /// Open a dataset or a scene in a window.
+    View: view;
 }
 
 /// Returns the command line as it is parsed.

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     dataset::{Dataset, replace_file},
     draw::canvas::Canvas,
-    gridize::{GridizeOptions, Interpolation},
+    gridize::{GridizeOptions, Interpolation, WITHIN},
     paper::{Comparison, Scanned, Scans, Sphere, haptize, procedure, specimen},
     render::{
         setup::Setup,
@@ -268,6 +268,7 @@ impl Specimen {
             epsilon: source.epsilon,
             interpolation: Interpolation::Linear,
             smooth: false,
+            within: WITHIN,
         };
         let (dataset, _) = source.gridize(&options)?;
         dataset.save(&folder.join(self.name).with_extension("haptize"))?;

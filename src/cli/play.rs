@@ -49,7 +49,7 @@ Examples:
   haptize play sphere.haptize --replay session.csv
   haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
 pub struct Arguments {
-    /// A dataset, or a scene: contact is then solved in every tick, before the surface at rest, and nothing is baked.
+    /// A dataset, or a scene: contact is then solved live, in every tick, by the law `rest`, and nothing is baked.
     dataset: PathBuf,
     /// Motion of the hand: `press` or `scrape` as in the scene, a CSV file of times (s) and joint coordinates, or joint
     /// states in MCAP, such as a session that --record wrote.
@@ -64,6 +64,11 @@ pub struct Arguments {
     /// Move the device exactly as the motion says, whatever the torque, instead of letting a simulated hand hold it.
     #[arg(long)]
     exact: bool,
+    /// Solve in every tick the contact of an object that remembers node by node, in place of the loop's one number a term
+    /// of [object.relaxation]: what that is compared with. Slower than time. Of a dataset the contact is that of its
+    /// scene.
+    #[arg(long, conflicts_with_all = ["device", "realtime"])]
+    reference: bool,
     /// A real device instead of a simulated hand, always against the clock: KIND or KIND:PLACE, as `haptize device
     /// list` shows it.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["exact", "beside", "replay"])]
@@ -78,7 +83,7 @@ pub struct Arguments {
     #[arg(long)]
     realtime: bool,
     /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives
-    /// joint states in MCAP, for other programs and for --motion; only the table that other names give can be replayed.
+    /// joint states in MCAP, for other programs and for --motion; any other gives a table, which alone can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay the session in this file and check that it matches bit for bit.
@@ -99,7 +104,7 @@ const LONGEST: f64 = 3600.0;
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
     let Outputs { filled, replaced } = Outputs::check(arguments, &folder)?;
-    let live = live(&arguments.dataset)?;
+    let live = live(arguments)?;
     let dataset = Arc::new(match &live {
         Some(scene) => scene.dataset(),
         None => Dataset::load(&arguments.dataset)?,
@@ -157,6 +162,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         felt.beside(beside, played.trace.summary().seconds)?;
         let drawn = felt.draw(&folder, &played.trace)?;
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
+    }
+    if live.is_some() && !trace.ticks.iter().any(|tick| tick.sample.contact) {
+        let what =
+            "the arm never met the object; `haptize place SCENE` says how far it is, and makes a motion that presses";
+        tell(format_args!("haptize: nothing touches: {what}"));
     }
     let tally = tally(trace);
     let summary = trace.summary();
@@ -379,7 +389,9 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Stri
 fn folder(arguments: &Arguments) -> PathBuf {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let felt = arguments.replay.as_deref().unwrap_or(Path::new(&arguments.motion));
-    let named = || Path::new("out").join(format!("{}-{}", stem(&arguments.dataset), stem(felt)));
+    // Beside what a dataset of the same name gave, not in its place.
+    let live = if Scene::is_at(&arguments.dataset) { "-live" } else { "" };
+    let named = || Path::new("out").join(format!("{}{live}-{}", stem(&arguments.dataset), stem(felt)));
     arguments.output.clone().unwrap_or_else(named)
 }
 
@@ -405,9 +417,17 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
     Ok(())
 }
 
-/// The scene at `path`, prepared to be solved live; none where `path` is no scene.
-fn live(path: &Path) -> Result<Option<Arc<LiveScene>>, Failure> {
-    Ok(if Scene::is_at(path) { Some(Arc::new(LiveScene::new(Scene::load(path)?)?)) } else { None })
+/// The scene that `arguments` name, or that of the dataset where a reference is wanted, prepared to be solved live; none
+/// of a dataset that is looked up.
+fn live(arguments: &Arguments) -> Result<Option<Arc<LiveScene>>, Failure> {
+    let path = &arguments.dataset;
+    let scene = match (Scene::is_at(path), arguments.reference) {
+        (true, _) => Scene::load(path)?,
+        (false, true) => Scene::parse(&Dataset::load(path)?.scene, path)?,
+        (false, false) => return Ok(None),
+    };
+    let live = if arguments.reference { LiveScene::remembering(&scene) } else { LiveScene::new(scene) };
+    Ok(Some(Arc::new(live?)))
 }
 
 /// Returns which of the files that a session writes are there already.

@@ -7,6 +7,7 @@ use super::model::Model;
 use super::{NodeForce, Slip, Status, reach};
 use crate::JointVector;
 use crate::proxy::Pose;
+use glam::DVec3;
 
 /// Largest contact that is solved. The scenes that ship have up to 40 rows on 200 nodes. A round with 512 rows takes some
 /// milliseconds: a loop of 1 kHz slows down in so wide a contact, and is not stopped by its watchdog, which lets ticks
@@ -64,7 +65,7 @@ impl<'a> LiveSolver<'a> {
         if !found.gap.is_finite() {
             return found;
         }
-        if found.gap >= 0.0 {
+        if found.gap >= rest.farthest() {
             found.status = Status::Free;
             return found;
         }
@@ -86,9 +87,26 @@ impl<'a> LiveSolver<'a> {
             let moved = model.motion_bound(rest.elastic).moved;
             let touching = on_proxy.iter().map(|force| force.node as usize);
             let is_covered = reach::covers(model, detection, rest.loaded(), touching, moved);
-            found.status = if is_covered { Status::Contact } else { Status::Overflow };
+            found.status = match is_covered {
+                // Of a dent that is deeper than the proxy.
+                true if found.contact_nodes == 0 && rest.farthest() > 0.0 => Status::Free,
+                true => Status::Contact,
+                false => Status::Overflow,
+            };
         }
         found
+    }
+
+    /// Lets the surface stand displaced where nothing touches it, by `standing` at each of its nodes (m).
+    pub fn stand(&mut self, standing: &[DVec3]) {
+        self.rest.standing.clear();
+        self.rest.standing.extend_from_slice(standing);
+    }
+
+    /// Forces of contact on the object's nodes at the configuration that was solved last (N).
+    pub fn on_object(&self) -> impl Iterator<Item = NodeForce> {
+        let forces = self.rest.support.nodes().iter().zip(self.rest.forces.as_chunks::<3>().0);
+        forces.map(|(&node, force)| NodeForce { node, force: DVec3::from_array(*force) })
     }
 
     /// Returns the slip of the contacts at `q`, the configuration that was solved last. Never allocates.

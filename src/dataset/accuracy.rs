@@ -63,7 +63,7 @@ pub struct IdentifiedFriction {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
     /// Torque on every fourth stroke, predicted from the others less the measured one, rms, a joint each: with friction,
-    /// and without (N m or N). Empty where none was held out.
+    /// and without (N m or N). A joint that is predicted no better with friction has none. Empty where none was held out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub predicted: Vec<[f64; 2]>,
 }

@@ -68,32 +68,29 @@ impl Kind {
         Self::Simulated,
     ];
 
+    /// Its name on the command line, and what it is, for people.
+    fn words(self) -> [&'static str; 2] {
+        match self {
+            Self::TwoDiy => ["2diy", "Haply 2DIY, third version, on a serial line"],
+            Self::TwoDiyV2 => ["2diy-v2", "Haply 2DIY, second version (metal), on a serial line"],
+            Self::WoodenHaptics => ["woodenhaptics", "WoodenHaptics on a serial line"],
+            Self::Inverse3 => ["inverse3", "Haply Inverse3, through the service of Inverse SDK 3.5"],
+            Self::ForceDimension => ["force-dimension", "Force Dimension omega, delta, sigma, lambda, through libdrd"],
+            Self::Touch => ["touch", "3D Systems Touch, Phantom, through libHD (OpenHaptics)"],
+            Self::Simulated => ["simulated", "a simulated device that can be told to fail; no motor turns"],
+        }
+    }
+
     /// Returns its name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::TwoDiy => "2diy",
-            Self::TwoDiyV2 => "2diy-v2",
-            Self::WoodenHaptics => "woodenhaptics",
-            Self::Inverse3 => "inverse3",
-            Self::ForceDimension => "force-dimension",
-            Self::Touch => "touch",
-            Self::Simulated => "simulated",
-        }
+        self.words()[0]
     }
 
     /// Returns what it is, for people.
     #[must_use]
     pub fn title(self) -> &'static str {
-        match self {
-            Self::TwoDiy => "Haply 2DIY, third version, on a serial line",
-            Self::TwoDiyV2 => "Haply 2DIY, second version (metal), on a serial line",
-            Self::WoodenHaptics => "WoodenHaptics on a serial line",
-            Self::Inverse3 => "Haply Inverse3, through the service of Inverse SDK 3.5",
-            Self::ForceDimension => "Force Dimension omega, delta, sigma, lambda, through libdrd",
-            Self::Touch => "3D Systems Touch, Phantom, through libHD (OpenHaptics)",
-            Self::Simulated => "a simulated device that can be told to fail; no motor turns",
-        }
+        self.words()[1]
     }
 
     /// Looks what this machine has of it, without opening a device.
@@ -107,9 +104,7 @@ impl Kind {
             Self::Simulated => Finding { places: vec![self.name().into()], missing: Vec::new() },
         }
     }
-}
 
-impl Kind {
     /// Looks for a maker's library: what is behind it shows when it is opened.
     fn behind(self, library: &LibraryFiles) -> Finding {
         match library.found() {

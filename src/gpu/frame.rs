@@ -1,20 +1,16 @@
 //! The object's nodes, one passive step a frame (theory: non-iterative passive mechanical integration):
 //! `(2M/T + B + (T/2) K) v_hat = (2M/T) v_k - K (n_k - n0) + f`, `n_{k+1} = n_k + T v_hat`, `v_{k+1} = 2 v_hat - v_k`.
 //!
-//! The state stays on the device, in a buffer that a viewer draws from. Small objects multiply by the inverse of the
-//! matrix, computed once in f64; large ones, whose inverse would not fit, take a fixed number of conjugate-gradient
-//! iterations, which keeps the step passive however few they are (see `shaders/frame_iterative.wgsl`).
-//!
-//! Effects, as in `render/object_motion.rs`, which is the twin: under gravity and with stiffening the nodes' loads are
-//! a buffer of their own, forces and weight from the host; stiffening adds its part to it, in a stage of its own, and
-//! puts K1 in the place of K; quasi-static graphics is an override constant, without velocities and masses. What the
-//! scene does not name is not there.
+//! The state stays on the device, in a buffer that a viewer draws from, and is multiplied by the inverse of the matrix,
+//! computed once in f64. Large objects, whose inverse would not fit, those whose surface follows other nodes, and effects
+//! are left to the CPU's step (`render/object_motion.rs`, the twin), which takes less than a millisecond for as many
+//! nodes as have an inverse here.
 
 use super::{
     buffer::StorageBuffer, context::Context, dispatch::Dispatch, error::GpuError, kernel::Kernel,
     layout::FrameParameters, shaders,
 };
-use crate::object::{Attachment, Compliance, Factor, Mechanics, Object, Stiffening, Stiffness, settled};
+use crate::object::{Compliance, Factor, Mechanics, Object};
 use crate::scene::GraphicsEffects;
 use crate::{Error, error, memory};
 use glam::DVec3;
@@ -23,44 +19,9 @@ use std::sync::Arc;
 /// Invocations of a workgroup; the shader's default.
 const WORKGROUP: u32 = 64;
 
-/// Size of a node's force, displacement, velocity, or vector of the iteration (B).
-const VECTOR: u64 = 16;
-
-/// Which solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FrameMethod {
-    /// Inverse computed beforehand: 4 N^2 bytes where springs and ground are isotropic, else 36 N^2; two dispatches a
-    /// frame.
-    Inverse,
-    /// This many iterations of conjugate gradients a frame, at least one.
-    Iterations(u32),
-}
-
-impl FrameMethod {
-    /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground
-    /// are isotropic, else of 1,000 (B).
-    const MOST_BYTES_INVERTED: usize = 36_000_000;
-
-    /// Enough iterations for objects whose springs reach a few dozen edges in one period.
-    pub const USUAL_ITERATIONS: u32 = 32;
-
-    /// Chooses the method for an object.
-    #[must_use]
-    pub fn suitable(mechanics: &Mechanics) -> Self {
-        let Mechanics { stiffness, moved, .. } = mechanics;
-        let order = if stiffness.is_isotropic() { moved.len() } else { 3 * moved.len() };
-        if order.saturating_pow(2) <= Self::MOST_BYTES_INVERTED / size_of::<f32>() {
-            Self::Inverse
-        } else {
-            Self::Iterations(Self::USUAL_ITERATIONS)
-        }
-    }
-}
-
 /// One dispatch of every frame.
-#[derive(Clone)]
 struct FramePass {
-    kernel: Arc<Kernel>,
+    kernel: Kernel,
     bound: wgpu::BindGroup,
     workgroups: u32,
     /// See [`Dispatch::bytes`].
@@ -77,206 +38,123 @@ impl FramePass {
 /// The nodes' state on the device, and the stages that advance it.
 pub struct FrameUpdate {
     context: Arc<Context>,
-    state: StorageBuffer,
-    /// N, and displacements of the object's nodes where these are not those of K.
-    attachment: Attachment,
-    followers: Option<StorageBuffer>,
+    nodes: usize,
     forces: StorageBuffer,
-    /// Forces on the nodes of K, weight and what stiffening adds; absent where they are `forces`.
-    loads: Option<StorageBuffer>,
-    /// M g of each node (N); none without gravity.
-    weight: Vec<DVec3>,
-    /// Forces on the nodes of K (N).
-    acting: Vec<DVec3>,
+    state: StorageBuffer,
     /// Forces as the shader reads them.
     padded: Vec<[f32; 4]>,
-    stages: Vec<FramePass>,
-    takes: FrameCost,
-}
-
-/// Resources of a frame update on the device.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct FrameCost {
-    /// Memory of all its buffers (B).
-    pub bytes: u64,
-    /// Number of its buffers.
-    pub buffers: usize,
-    /// Dispatches a frame.
-    pub dispatches: usize,
-    /// Compiled pipelines.
-    pub pipelines: usize,
-}
-
-impl FrameCost {
-    /// That of buffers of these sizes (B), and of stages.
-    fn of(buffers: &[u64], stages: &[FramePass]) -> Self {
-        let mut pipelines: Vec<_> = stages.iter().map(|stage| Arc::as_ptr(&stage.kernel)).collect();
-        pipelines.sort_unstable();
-        pipelines.dedup();
-        Self {
-            bytes: buffers.iter().sum(),
-            buffers: buffers.len(),
-            dispatches: stages.len(),
-            pipelines: pipelines.len(),
-        }
-    }
+    stages: [FramePass; 2],
+    bytes: u64,
 }
 
 impl FrameUpdate {
-    /// The object in equilibrium under no forces but its weight, where there is one, to be advanced by `period` (s) a
-    /// frame. Smoothing is no matter of the device: forces are filtered before they come here.
-    ///
-    /// # Errors
-    /// When the matrix is not positive definite (masses, damping or period are not positive), its inverse would not fit
-    /// in memory, or the device refuses.
-    pub fn new(
-        context: Arc<Context>,
-        object: &Object,
-        period: f64,
-        method: FrameMethod,
-        effects: &GraphicsEffects,
-    ) -> Result<Self, Error> {
-        Self::remembering(context, object, period, method, effects, false)
+    /// Most memory that an inverse is worth, which is read once a frame: that of 3,000 nodes where springs and ground
+    /// are isotropic, else of 1,000 (B).
+    const MOST_BYTES_INVERTED: usize = 36_000_000;
+
+    /// Whether an object of these `mechanics` is moved here: its surface follows no other nodes, nothing but smoothing
+    /// acts on what is drawn, and the inverse is small enough to be read in every frame, 4 N^2 bytes where springs and
+    /// ground are isotropic, else 36 N^2.
+    #[must_use]
+    pub fn suits(mechanics: &Mechanics, effects: &GraphicsEffects) -> bool {
+        let Mechanics { stiffness, moved, attachment, .. } = mechanics;
+        let order = if stiffness.is_isotropic() { moved.len() } else { 3 * moved.len() };
+        let is_plain = GraphicsEffects { smoothing: None, ..*effects } == GraphicsEffects::default();
+        attachment.is_identity() && is_plain && order.saturating_pow(2) <= Self::MOST_BYTES_INVERTED / size_of::<f32>()
     }
 
-    /// As [`FrameUpdate::new`]; `remembers`: a body force of the object's past acts beside the contact forces.
+    /// The object at rest, to be advanced by `period` (s) a frame. Smoothing is no matter of the device: forces are
+    /// filtered before they come here.
     ///
     /// # Errors
-    /// As there.
-    pub fn remembering(
-        context: Arc<Context>,
-        object: &Object,
-        period: f64,
-        method: FrameMethod,
-        effects: &GraphicsEffects,
-        remembers: bool,
-    ) -> Result<Self, Error> {
+    /// When the surface follows other nodes, the matrix is not positive definite (masses, damping or period are not
+    /// positive), its inverse would not fit in memory, or the device refuses.
+    pub fn new(context: Arc<Context>, object: &Object, period: f64) -> Result<Self, Error> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(error!("the time between frames is {period} s; it must be a positive number"));
         }
         let mechanics = object.mechanics()?;
-        let stiffening = effects.stiffening.map(|spec| Stiffening::new(mechanics, spec.factor, spec.strain));
-        let weight: Vec<DVec3> =
-            effects.gravity.map_or_else(Vec::new, |g| mechanics.mass.iter().map(|m| *m * g).collect());
-        let start = start(mechanics, &weight, stiffening.as_ref(), effects)?;
-        let stiffness = stiffening.as_ref().map_or(&mechanics.stiffness, Stiffening::bound);
-        let gpu = context.as_ref();
-        let common =
-            Common::new(gpu, mechanics, stiffness, (period, effects), &start, !weight.is_empty() || remembers)?;
-        let mut stages = Vec::new();
-        let mut buffers = common.sizes();
-        if let (Some(stiffening), Some(loads), Some(spec)) = (&stiffening, &common.loads, effects.stiffening) {
-            let reach: Vec<f32> = stiffening.unit_strain_force().iter().map(|&force| force as f32).collect();
-            let reach = StorageBuffer::from_slice(gpu, "reach of the springs", &reach)?;
-            buffers.push(reach.size());
-            stages.push(common.stiffening_stage(gpu, &reach, loads, [spec.factor, spec.strain])?);
+        let Mechanics { stiffness, mass, damping, attachment, .. } = mechanics;
+        if !attachment.is_identity() {
+            return Err("the object's surface follows the nodes of its elements: the CPU moves it".into());
         }
-        let mut overrides = if effects.quasi_static { vec![("QUASI_STATIC", 1.0)] } else { Vec::new() };
-        match method {
-            FrameMethod::Inverse => {
-                let (inverse, is_isotropic) = inverse(mechanics, stiffness, period, effects)?;
-                if is_isotropic {
-                    overrides.push(("ISOTROPIC", 1.0));
-                }
-                let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
-                let right = StorageBuffer::new(gpu, "right-hand side", 12 * u64::from(common.parameters.nodes))?;
-                buffers.extend([inverse.size(), right.size()]);
-                stages.extend(common.dense_stages(gpu, [&inverse, &right], &overrides)?);
-            }
-            FrameMethod::Iterations(iterations) => {
-                let odd = StorageBuffer::uniform(
-                    gpu,
-                    "frame parameters",
-                    &[FrameParameters { odd: 1, ..common.parameters }],
-                )?;
-                let vectors = WORK_VECTORS * VECTOR * u64::from(common.parameters.nodes);
-                let work = StorageBuffer::new(gpu, "conjugate gradients", vectors)?;
-                let sums = StorageBuffer::new(gpu, "sums", 3 * 4 * u64::from(common.parameters.groups))?;
-                buffers.extend([odd.size(), work.size(), sums.size()]);
-                stages.extend(common.iterative_stages(gpu, &odd, [&work, &sums], iterations, &overrides)?);
-            }
-        }
-        let attachment = mechanics.attachment.clone();
-        let followers = if attachment.is_identity() {
-            None
-        } else {
-            let (stage, followers) = following_stage(gpu, &attachment, &common.state, &mut buffers)?;
-            stages.push(stage);
-            Some(followers)
+        let (nodes, gpu) = (mechanics.moved.len(), context.as_ref());
+        let (inverse, is_isotropic) = inverse(mechanics, period)?;
+        let structure = stiffness.offsets.iter().map(|&offset| offset as u32).chain(stiffness.columns.iter().copied());
+        let blocks = stiffness.blocks.iter().flat_map(|block| block.to_cols_array()).map(|entry| entry as f32);
+        let inertia = mass.iter().zip(damping).map(|(&mass, &damping)| [mass as f32, damping as f32]);
+        let parameters = FrameParameters { nodes: nodes as u32, period: period as f32 };
+        let parameters = StorageBuffer::uniform(gpu, "frame parameters", &[parameters])?;
+        let structure = StorageBuffer::from_slice(gpu, "stiffness structure", &structure.collect::<Vec<_>>())?;
+        let blocks = StorageBuffer::from_slice(gpu, "stiffness blocks", &blocks.collect::<Vec<_>>())?;
+        let inertia = StorageBuffer::from_slice(gpu, "masses and damping", &inertia.collect::<Vec<_>>())?;
+        let forces = StorageBuffer::from_slice(gpu, "frame forces", &vec![[0.0f32; 4]; nodes])?;
+        let state = StorageBuffer::from_slice(gpu, "frame state", &vec![[0.0f32; 4]; 2 * nodes])?;
+        let inverse = StorageBuffer::from_slice(gpu, "inverse", &inverse)?;
+        let right = StorageBuffer::new(gpu, "right-hand side", 12 * nodes as u64)?;
+        let buffers = [
+            ("parameters", &parameters),
+            ("structure", &structure),
+            ("blocks", &blocks),
+            ("inertia", &inertia),
+            ("forces", &forces),
+            ("state", &state),
+            ("right", &right),
+            ("inverse", &inverse),
+        ];
+        let overrides: &[(&str, f64)] = if is_isotropic { &[("ISOTROPIC", 1.0)] } else { &[] };
+        let stage = |shader, workgroups, bytes| -> Result<FramePass, GpuError> {
+            let kernel = Kernel::new(gpu, shader, overrides)?;
+            let bound = kernel.bind(gpu, &buffers)?;
+            Ok(FramePass { kernel, bound, workgroups, bytes })
         };
-        let takes = FrameCost::of(&buffers, &stages);
-        let (acting, padded) = (vec![DVec3::ZERO; mechanics.moved.len()], Vec::new());
-        let Common { state, forces, loads, .. } = common;
-        Ok(Self { state, attachment, followers, forces, loads, weight, acting, padded, stages, takes, context })
+        let load = buffers[1..7].iter().map(|(_, buffer)| buffer.size()).sum();
+        let advance = inverse.size() + right.size() + 2 * state.size();
+        let stages = [
+            stage(&shaders::FRAME_LOAD, (nodes as u32).div_ceil(WORKGROUP), load)?,
+            stage(&shaders::FRAME_ADVANCE, nodes as u32, advance)?,
+        ];
+        let bytes = buffers.iter().map(|(_, buffer)| buffer.size()).sum();
+        Ok(Self { context, nodes, forces, state, padded: Vec::new(), stages, bytes })
     }
 
-    /// Returns the resources of the update on the device.
+    /// Memory of all its buffers on the device (B).
     #[must_use]
-    pub fn takes(&self) -> FrameCost {
-        self.takes
+    pub fn bytes(&self) -> u64 {
+        self.bytes
     }
 
-    /// Advances by one frame under `forces`, one per node of the object (N); missing ones count as zero. Does not wait
-    /// for the device.
+    /// Advances by one frame under `forces`, one per node (N); missing ones count as zero. Does not wait for the device.
     ///
     /// # Errors
     /// When the device has failed.
     pub fn step(&mut self, forces: &[DVec3]) -> Result<(), GpuError> {
-        self.step_remembering(forces, &[])
-    }
-
-    /// As [`FrameUpdate::step`], with the body force `past` beside the forces of `contact`.
-    ///
-    /// # Errors
-    /// When the device has failed.
-    pub fn step_remembering(&mut self, contact: &[DVec3], past: &[DVec3]) -> Result<(), GpuError> {
-        let padded = |force: DVec3| force.as_vec3().extend(0.0).to_array();
         self.padded.clear();
-        self.padded.extend(contact.iter().map(|force| padded(*force)));
-        self.padded.resize(self.attachment.rows(), [0.0; 4]);
+        self.padded.extend(forces.iter().map(|force| force.as_vec3().extend(0.0).to_array()));
+        self.padded.resize(self.nodes, [0.0; 4]);
         self.forces.write(&self.context, &self.padded);
-        if let Some(loads) = &self.loads {
-            self.attachment.spread(contact, &mut self.acting);
-            self.attachment.add(past, &mut self.acting);
-            self.acting.iter_mut().zip(&self.weight).for_each(|(force, weight)| *force += *weight);
-            self.padded.clear();
-            self.padded.extend(self.acting.iter().map(|force| padded(*force)));
-            loads.write(&self.context, &self.padded);
-        }
         let mut encoder = self.context.device.create_command_encoder(&Default::default());
         self.context.record(&mut encoder, self.stages.iter().map(FramePass::dispatch));
         self.context.queue.submit([encoder.finish()]);
         self.context.check()
     }
 
-    /// Displacements u = n - n0 (m) and velocities (m/s) of all nodes of K; of quasi-static graphics no velocities.
-    /// Waits for the device.
+    /// Displacements u = n - n0 (m) and velocities (m/s) of all nodes. Waits for the device.
     ///
     /// # Errors
     /// When the device has failed.
     pub fn read(&self) -> Result<(Vec<DVec3>, Vec<DVec3>), GpuError> {
-        let state: Vec<[f32; 4]> = self.state.read(&self.context, self.state.size() as usize / 16)?;
+        let state: Vec<[f32; 4]> = self.state.read(&self.context, 2 * self.nodes)?;
         let mut vectors: Vec<DVec3> =
             state.iter().map(|&[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())).collect();
-        let velocities = vectors.split_off(self.attachment.columns());
+        let velocities = vectors.split_off(self.nodes);
         Ok((vectors, velocities))
     }
 
-    /// Displacements of the object's own nodes (m), as they are drawn. Waits for the device.
-    ///
-    /// # Errors
-    /// When the device has failed.
-    pub fn drawn(&self) -> Result<Vec<DVec3>, GpuError> {
-        let drawn = self.followers.as_ref().unwrap_or(&self.state);
-        let drawn: Vec<[f32; 4]> = drawn.read(&self.context, self.attachment.rows())?;
-        Ok(drawn.iter().map(|&[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())).collect())
-    }
-
-    /// Displacements of the object's nodes, maybe velocities after them, four numbers a node: what a viewer binds to draw
-    /// the object.
+    /// Displacements of the nodes, then velocities, four numbers a node: what a viewer binds to draw the object.
     #[must_use]
     pub fn state_buffer(&self) -> &wgpu::Buffer {
-        &self.followers.as_ref().unwrap_or(&self.state).raw
+        &self.state.raw
     }
 
     /// Contact forces of the last frame, four numbers a node (N).
@@ -286,74 +164,13 @@ impl FrameUpdate {
     }
 }
 
-/// The stage by which the object's nodes follow `state`, and their displacements; `buffers` takes the sizes of all that
-/// it needs (B).
-fn following_stage(
-    gpu: &Context,
-    attachment: &Attachment,
-    state: &StorageBuffer,
-    buffers: &mut Vec<u64>,
-) -> Result<(FramePass, StorageBuffer), GpuError> {
-    let nodes = attachment.rows();
-    let entries = (0..nodes).flat_map(|node| attachment.row(node));
-    let (columns, weights): (Vec<u32>, Vec<f32>) = entries.map(|&(column, weight)| (column, weight as f32)).unzip();
-    let ends = (0..nodes).scan(0, |end, node| {
-        *end += attachment.row(node).len() as u32;
-        Some(*end)
-    });
-    let rows: Vec<u32> = std::iter::once(0).chain(ends).chain(columns).collect();
-    let rows = StorageBuffer::from_slice(gpu, "rows of the attachment", &rows)?;
-    let weights = StorageBuffer::from_slice(gpu, "weights of the attachment", &weights)?;
-    let followers = StorageBuffer::from_slice(gpu, "followers", &vec![[0.0f32; 4]; nodes])?;
-    let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_SURFACE, &[])?);
-    let named = [("rows", &rows), ("weights", &weights), ("state", state), ("followers", &followers)];
-    let bound = kernel.bind(gpu, &named)?;
-    let sizes = [rows.size(), weights.size(), followers.size()];
-    buffers.extend(sizes);
-    let pass = FramePass {
-        kernel,
-        bound,
-        workgroups: (nodes as u32).div_ceil(WORKGROUP),
-        bytes: sizes.iter().sum::<u64>() + state.size(),
-    };
-    Ok((pass, followers))
-}
-
-/// State at the start: displacements under the nodes' `weight` (m), then velocities where there are any; four numbers a
-/// node.
-fn start(
-    mechanics: &Mechanics,
-    weight: &[DVec3],
-    stiffening: Option<&Stiffening>,
-    effects: &GraphicsEffects,
-) -> Result<Vec<[f32; 4]>, Error> {
-    let nodes = mechanics.moved.len();
-    let mut start = vec![[0.0; 4]; if effects.quasi_static { nodes } else { 2 * nodes }];
-    if !weight.is_empty() {
-        for (start, u) in start.iter_mut().zip(settled(mechanics, weight, stiffening)?) {
-            *start = u.as_vec3().extend(0.0).to_array();
-        }
-    }
-    Ok(start)
-}
-
-/// Inverse of 2M/T + B + (T/2) K, row-major; of (T/2) K in quasi-static graphics. One number for a pair of nodes where
-/// the three coordinates are alike, as the flag says, else 3 x 3. An inverse that would not fit in memory is an
-/// error before it is begun.
-fn inverse(
-    mechanics: &Mechanics,
-    stiffness: &Stiffness,
-    period: f64,
-    effects: &GraphicsEffects,
-) -> Result<(Vec<f32>, bool), Error> {
-    let nodes = mechanics.moved.len();
-    let inertia = mechanics.mass.iter().zip(&mechanics.damping);
-    let mut diagonal: Vec<f64> = inertia.map(|(mass, damping)| 2.0 * mass / period + damping).collect();
-    if effects.quasi_static {
-        diagonal.fill(0.0);
-    }
-    check_memory(nodes, stiffness.is_isotropic())?;
-    let inverse = Compliance::inverse(&Factor::of(stiffness, period / 2.0, &diagonal)?, nodes);
+/// Inverse of 2M/T + B + (T/2) K, row-major. One number for a pair of nodes where the three coordinates are alike, as the
+/// flag says, else 3 x 3. An inverse that would not fit in memory is an error before it is begun.
+fn inverse(mechanics: &Mechanics, period: f64) -> Result<(Vec<f32>, bool), Error> {
+    let Mechanics { stiffness, mass, damping, .. } = mechanics;
+    let diagonal: Vec<f64> = mass.iter().zip(damping).map(|(mass, damping)| 2.0 * mass / period + damping).collect();
+    check_memory(diagonal.len(), stiffness.is_isotropic())?;
+    let inverse = Compliance::inverse(&Factor::of(stiffness, period / 2.0, &diagonal)?, diagonal.len());
     let entries = inverse.entries.iter().map(|&entry| entry as f32).collect();
     Ok((entries, inverse.rows_per_node == 1))
 }
@@ -365,172 +182,6 @@ fn check_memory(nodes: usize, is_isotropic: bool) -> Result<(), Error> {
     let bytes = order.saturating_pow(2).saturating_mul(size_of::<f64>() + 2 * size_of::<f32>());
     let enough = if bytes > memory::SMALL { memory::check(bytes) } else { Ok(()) };
     enough.map_err(|shortage| error!("the motion of an object of {nodes} nodes: {shortage}, or use a coarser surface"))
-}
-
-/// Vectors of the iteration: v_hat, residual, direction, product, diagonal.
-const WORK_VECTORS: u64 = 5;
-
-/// Buffers that all stages bind.
-struct Common {
-    /// The parameters of even iterations.
-    parameters: FrameParameters,
-    even: StorageBuffer,
-    structure: StorageBuffer,
-    blocks: StorageBuffer,
-    /// Masses and damping; none in quasi-static graphics.
-    inertia: Option<StorageBuffer>,
-    forces: StorageBuffer,
-    /// See [`FrameUpdate::loads`].
-    loads: Option<StorageBuffer>,
-    state: StorageBuffer,
-}
-
-impl Common {
-    /// The update of an object of matrix `stiffness`, from the state `start`; `is_heavy` where nodes have a weight.
-    fn new(
-        gpu: &Context,
-        mechanics: &Mechanics,
-        stiffness: &Stiffness,
-        (period, effects): (f64, &GraphicsEffects),
-        start: &[[f32; 4]],
-        is_heavy: bool,
-    ) -> Result<Self, GpuError> {
-        let nodes = mechanics.moved.len();
-        let zero = vec![[0.0f32; 4]; nodes.max(mechanics.attachment.rows())];
-        let has_loads = is_heavy || effects.stiffening.is_some() || !mechanics.attachment.is_identity();
-        let mut structure: Vec<u32> = stiffness.offsets.iter().map(|&offset| offset as u32).collect();
-        structure.extend(&stiffness.columns);
-        let blocks: Vec<f32> =
-            stiffness.blocks.iter().flat_map(|block| block.to_cols_array()).map(|entry| entry as f32).collect();
-        let inertia: Vec<[f32; 2]> = mechanics
-            .mass
-            .iter()
-            .zip(&mechanics.damping)
-            .map(|(&mass, &damping)| [mass as f32, damping as f32])
-            .collect();
-        let groups = (nodes as u32).div_ceil(WORKGROUP);
-        let parameters = FrameParameters { nodes: nodes as u32, period: period as f32, odd: 0, groups };
-        Ok(Self {
-            parameters,
-            even: StorageBuffer::uniform(gpu, "frame parameters", &[parameters])?,
-            structure: StorageBuffer::from_slice(gpu, "stiffness structure", &structure)?,
-            blocks: StorageBuffer::from_slice(gpu, "stiffness blocks", &blocks)?,
-            inertia: (!effects.quasi_static)
-                .then(|| StorageBuffer::from_slice(gpu, "masses and damping", &inertia))
-                .transpose()?,
-            forces: StorageBuffer::from_slice(gpu, "frame forces", &zero[..mechanics.attachment.rows()])?,
-            loads: has_loads.then(|| StorageBuffer::from_slice(gpu, "frame loads", &zero[..nodes])).transpose()?,
-            state: StorageBuffer::from_slice(gpu, "frame state", start)?,
-        })
-    }
-
-    /// Sizes of the buffers (B).
-    fn sizes(&self) -> Vec<u64> {
-        let Self { parameters: _, even, structure, blocks, inertia, forces, loads, state } = self;
-        let always = [state, forces, structure, blocks, even];
-        always.into_iter().chain(inertia).chain(loads).map(StorageBuffer::size).collect()
-    }
-
-    /// Nothing reads masses where there are none: the binding takes any buffer.
-    fn masses(&self) -> &StorageBuffer {
-        self.inertia.as_ref().unwrap_or(&self.forces)
-    }
-
-    /// The forces that act on the nodes.
-    fn acting(&self) -> &StorageBuffer {
-        self.loads.as_ref().unwrap_or(&self.forces)
-    }
-
-    /// Bindings of a stage on which `forces` act and that has two buffers of its own.
-    fn bindings<'a>(
-        &'a self,
-        parameters: &'a StorageBuffer,
-        forces: &'a StorageBuffer,
-        own: [(&'a str, &'a StorageBuffer); 2],
-    ) -> [(&'a str, &'a StorageBuffer); 8] {
-        [
-            ("parameters", parameters),
-            ("structure", &self.structure),
-            ("blocks", &self.blocks),
-            ("inertia", self.masses()),
-            ("forces", forces),
-            ("state", &self.state),
-            own[0],
-            own[1],
-        ]
-    }
-
-    /// Adds what stiffening by `factor` from the strain `strain` on adds to the `loads`.
-    fn stiffening_stage(
-        &self,
-        gpu: &Context,
-        reach: &StorageBuffer,
-        loads: &StorageBuffer,
-        [factor, strain]: [f64; 2],
-    ) -> Result<FramePass, GpuError> {
-        let Self { even, structure, blocks, forces, .. } = self;
-        let constants = [("FACTOR", factor), ("STRAIN", strain)];
-        let kernel = Arc::new(Kernel::new(gpu, &shaders::FRAME_STIFFENING, &constants)?);
-        let bound = kernel.bind(gpu, &self.bindings(even, forces, [("reach", reach), ("loads", loads)]))?;
-        // Forces and what is added to them are read and written, displacements read.
-        let vectors = 3 * VECTOR * u64::from(self.parameters.nodes);
-        let bytes = structure.size() + blocks.size() + reach.size() + vectors;
-        Ok(FramePass { kernel, bound, workgroups: self.parameters.groups, bytes })
-    }
-
-    fn dense_stages(
-        &self,
-        gpu: &Context,
-        [inverse, right]: [&StorageBuffer; 2],
-        overrides: &[(&str, f64)],
-    ) -> Result<[FramePass; 2], GpuError> {
-        let buffers = self.bindings(&self.even, self.acting(), [("inverse", inverse), ("right", right)]);
-        let stage = |shader, workgroups, bytes| -> Result<FramePass, GpuError> {
-            let kernel = Arc::new(Kernel::new(gpu, shader, overrides)?);
-            let bound = kernel.bind(gpu, &buffers)?;
-            Ok(FramePass { kernel, bound, workgroups, bytes })
-        };
-        let load = buffers[1..6].iter().map(|(_, buffer)| buffer.size()).sum::<u64>() + right.size();
-        let advance = inverse.size() + right.size() + 2 * self.state.size();
-        let FrameParameters { nodes, groups, .. } = self.parameters;
-        Ok([stage(&shaders::FRAME_LOAD, groups, load)?, stage(&shaders::FRAME_ADVANCE, nodes, advance)?])
-    }
-
-    fn iterative_stages(
-        &self,
-        gpu: &Context,
-        odd: &StorageBuffer,
-        [work, sums]: [&StorageBuffer; 2],
-        iterations: u32,
-        overrides: &[(&str, f64)],
-    ) -> Result<Vec<FramePass>, GpuError> {
-        let workgroups = self.parameters.groups;
-        let own = [("work", work), ("sums", sums)];
-        let stage = |shader, bytes| -> Result<FramePass, GpuError> {
-            let kernel = Arc::new(Kernel::new(gpu, shader, overrides)?);
-            let bound = kernel.bind(gpu, &self.bindings(&self.even, self.acting(), own))?;
-            Ok(FramePass { kernel, bound, workgroups, bytes })
-        };
-        // The same kernel with the bindings of the odd iterations.
-        let odd = |stage: &FramePass| -> Result<FramePass, GpuError> {
-            let bound = stage.kernel.bind(gpu, &self.bindings(odd, self.acting(), own))?;
-            Ok(FramePass { bound, ..stage.clone() })
-        };
-        // Of the five vectors of the iteration, how many are read and written.
-        let vectors = |count: u64| count * work.size() / WORK_VECTORS;
-        let matrix = self.structure.size() + self.blocks.size() + self.masses().size();
-        let product = stage(&shaders::FRAME_PRODUCT, matrix + vectors(2))?;
-        let correct = stage(&shaders::FRAME_CORRECT, vectors(7))?;
-        let turn = stage(&shaders::FRAME_TURN, vectors(4))?;
-        let turns = [[product.clone(), correct.clone(), turn.clone()], [odd(&product)?, odd(&correct)?, odd(&turn)?]];
-        let states = self.acting().size() + self.state.size();
-        let mut stages = vec![stage(&shaders::FRAME_BEGIN, matrix + states + vectors(4))?];
-        for iteration in 0..iterations.max(1) as usize {
-            stages.extend_from_slice(&turns[iteration % 2]);
-        }
-        stages.push(stage(&shaders::FRAME_FINISH, vectors(1) + 2 * self.state.size())?);
-        Ok(stages)
-    }
 }
 
 #[cfg(test)]

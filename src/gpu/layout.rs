@@ -38,15 +38,13 @@ pub struct Parameters {
     pub rounds: u32,
 }
 
-/// `FrameParameters` of `shaders/frame_common.wgsl` (uniform).
+/// `FrameParameters` of `shaders/frame.wgsl` (uniform).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented where the shader reads them")]
 pub struct FrameParameters {
     pub nodes: u32,
     pub period: f32,
-    pub odd: u32,
-    pub groups: u32,
 }
 
 #[cfg(test)]
@@ -86,7 +84,7 @@ mod tests {
     fn every_shared_struct_is_laid_out_as_in_wgsl() {
         let expected: [(&str, Members, u32); 2] = [
             layout!(Parameters: configurations, joints, proxy_nodes, surface_nodes, triangles, leaves, covered, carriers, at_controls, at_masks, at_cubes, at_order, at_carriers, at_shapes, at_near, cubes_x, cubes_y, cubes_z, low_x, low_y, low_z, inverse_side, bulge, band, softness, mobility, least_distance, step, rounds),
-            layout!(FrameParameters: nodes, period, odd, groups),
+            layout!(FrameParameters: nodes, period),
         ];
         let reflected = reflect();
         for (name, members, size) in expected {

@@ -42,7 +42,7 @@ pub use adapter::{ADAPTER_VARIABLE, AdapterChoice, AdapterSummary, adapters, nam
 pub use context::Context;
 pub use device::BatchCapacity;
 pub use error::GpuError;
-pub use frame::{FrameCost, FrameMethod, FrameUpdate};
+pub use frame::FrameUpdate;
 pub use shaders::GPU_LEAST_DIVISOR;
 pub use solver::GpuSolver;
 pub use timing::KernelTime;

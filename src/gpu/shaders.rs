@@ -58,9 +58,7 @@ const fn stage(
 }
 
 const DISPATCH: &str = include_str!("../../shaders/dispatch.wgsl");
-const FRAME_COMMON: &str = include_str!("../../shaders/frame_common.wgsl");
 const FRAME: &str = include_str!("../../shaders/frame.wgsl");
-const FRAME_ITERATIVE: &str = include_str!("../../shaders/frame_iterative.wgsl");
 
 /// The compliance or the inverse has one number for a pair of nodes.
 const ISOTROPIC: &[(&str, f64)] = &[("ISOTROPIC", 1.0)];
@@ -85,59 +83,17 @@ pub static REST: Shader = stage(
     &[&[], &[("SMOOTH", 1.0)], ISOTROPIC, &[("WITH_TANGENT", 1.0), ("DEEPENINGS", 96.0)], &[("WHOLE", 0.0)]],
 );
 
-/// Graphics with dynamics, and without.
-const MOTIONS: &[&[(&str, f64)]] = &[&[], &[("QUASI_STATIC", 1.0)]];
+/// The inverse has nine numbers for a pair of nodes, or one.
+const INVERSES: &[&[(&str, f64)]] = &[&[], ISOTROPIC];
 
-/// The same for the inverse, with nine numbers for a pair of nodes and with one.
-const INVERSES: &[&[(&str, f64)]] =
-    &[&[], &[("QUASI_STATIC", 1.0)], ISOTROPIC, &[("QUASI_STATIC", 1.0), ("ISOTROPIC", 1.0)]];
+/// Frame update: right-hand side.
+pub static FRAME_LOAD: Shader = stage("frame", "load", &[FRAME], INVERSES);
 
-/// Frame update: what stiffening springs add to the loads.
-pub static FRAME_STIFFENING: Shader = stage(
-    "frame_stiffening",
-    "relieve",
-    &[FRAME_COMMON, include_str!("../../shaders/frame_stiffening.wgsl")],
-    &[&[("FACTOR", 8.0), ("STRAIN", 0.1)]],
-);
-
-/// Frame update: nodes that follow those of K.
-pub static FRAME_SURFACE: Shader =
-    stage("frame_surface", "main", &[include_str!("../../shaders/frame_surface.wgsl")], &[&[]]);
-
-/// Frame update by the inverse: right-hand side.
-pub static FRAME_LOAD: Shader = stage("frame", "load", &[FRAME_COMMON, FRAME], INVERSES);
-
-/// Frame update by the inverse: new state.
-pub static FRAME_ADVANCE: Shader = stage("frame", "advance", &[FRAME_COMMON, FRAME], INVERSES);
-
-/// Frame update by conjugate gradients: first residual and direction.
-pub static FRAME_BEGIN: Shader = stage("frame_iterative", "begin", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
-
-/// Frame update by conjugate gradients: matrix times direction.
-pub static FRAME_PRODUCT: Shader = stage("frame_iterative", "product", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
-
-/// Frame update by conjugate gradients: step along the direction.
-pub static FRAME_CORRECT: Shader = stage("frame_iterative", "correct", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
-
-/// Frame update by conjugate gradients: next direction.
-pub static FRAME_TURN: Shader = stage("frame_iterative", "turn", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
-
-/// Frame update by conjugate gradients: new state.
-pub static FRAME_FINISH: Shader = stage("frame_iterative", "finish", &[FRAME_COMMON, FRAME_ITERATIVE], MOTIONS);
+/// Frame update: new state.
+pub static FRAME_ADVANCE: Shader = stage("frame", "advance", &[FRAME], INVERSES);
 
 /// Every shader of the engine.
-pub static ALL: &[Shader] = &[
-    REST,
-    FRAME_STIFFENING,
-    FRAME_SURFACE,
-    FRAME_LOAD,
-    FRAME_ADVANCE,
-    FRAME_BEGIN,
-    FRAME_PRODUCT,
-    FRAME_CORRECT,
-    FRAME_TURN,
-    FRAME_FINISH,
-];
+pub static ALL: &[Shader] = &[REST, FRAME_LOAD, FRAME_ADVANCE];
 
 /// Constants that both sides use, as WGSL.
 fn constants() -> String {

@@ -10,6 +10,7 @@
 
 use super::samples::Samples;
 use crate::{Error, MAX_AXES, error, random::mix};
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Samples closer than this fraction of the extent are one point: far below any encoder's resolution (a 16-bit encoder
@@ -23,6 +24,13 @@ pub const JITTER: f64 = 1.0 / (1_u64 << 40) as f64;
 
 /// Extent of the samples off the best line or plane below which they count as flat: less than an encoder resolves.
 const FLAT_CLOUD: f64 = 1e-6;
+
+/// Points whose spacing is looked at (1): the median of so many is known to some percent.
+const SPACING_POINTS: usize = 100;
+
+/// Sine of the least angle between a direction and those before it (1): thirty degrees, far above what bends the lines of a
+/// scan.
+const OTHER_DIRECTION: f64 = 0.5;
 
 /// A position in scaled C-space; entries beyond the number of joints are zero.
 pub(super) type Position = [f64; MAX_AXES];
@@ -94,6 +102,52 @@ impl Cloud {
             *x = (q[joint] - self.origin[joint]) * self.scale[joint];
         }
         position
+    }
+
+    /// How far `length` in scaled coordinates is along each joint (rad or m).
+    pub fn unscaled(&self, length: f64) -> Vec<f64> {
+        self.scale.iter().take(self.joints).map(|scale| length / scale).collect()
+    }
+
+    /// Spacing of the points, scaled: the distance from a point to the nearest ones that together span all directions,
+    /// median over points. Lines of a scan are finely divided along their depth; what counts is the way to the next line.
+    pub fn spacing(&self) -> f64 {
+        let every = self.positions.len().div_ceil(SPACING_POINTS);
+        let points = (0..self.positions.len()).into_par_iter().step_by(every);
+        let mut spacings: Vec<f64> = points.map(|point| self.spacing_at(point)).collect();
+        let middle = spacings.len() / 2;
+        *spacings.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    fn spacing_at(&self, point: usize) -> f64 {
+        let mut basis: Vec<Position> = Vec::with_capacity(self.joints);
+        let mut spacing = 0.0;
+        while basis.len() < self.joints {
+            let mut nearest = (f64::INFINITY, [0.0; MAX_AXES]);
+            for other in &self.positions {
+                let offset: Position = std::array::from_fn(|axis| other[axis] - self.positions[point][axis]);
+                let square = dot(&offset, &offset);
+                if square >= nearest.0 {
+                    continue;
+                }
+                let mut rest = offset;
+                for direction in &basis {
+                    let along = dot(&offset, direction);
+                    rest.iter_mut().zip(direction).for_each(|(x, n)| *x -= along * n);
+                }
+                let length = dot(&rest, &rest).sqrt();
+                if length > OTHER_DIRECTION * square.sqrt() {
+                    nearest = (square, rest.map(|x| x / length));
+                }
+            }
+            // Where all others lie in fewer directions, this point has no spacing.
+            spacing = nearest.0.sqrt();
+            if spacing.is_infinite() {
+                break;
+            }
+            basis.push(nearest.1);
+        }
+        spacing
     }
 
     /// Torque of point `point`.
@@ -201,6 +255,11 @@ fn spanning_simplex(positions: &[Position], joints: usize) -> Result<Vec<u32>, E
 /// Inner product of two positions.
 pub(super) fn dot(a: &Position, b: &Position) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// Distance of two positions.
+pub(super) fn distance(a: &Position, b: &Position) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
 }
 
 /// `position` moved along each axis by a hash of its coordinates, by at most `most`.

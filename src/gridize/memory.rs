@@ -255,7 +255,13 @@ mod tests {
         let samples =
             Samples { joints: vec![JointLabel { name: "a".into(), unit: "rad".into() }], ..Samples::default() };
         let interpolation = crate::gridize::Interpolation::Linear;
-        let options = GridizeOptions { steps: vec![0.02], epsilon: Some(1e-3), interpolation, smooth: false };
+        let options = GridizeOptions {
+            steps: vec![0.02],
+            epsilon: Some(1e-3),
+            interpolation,
+            smooth: false,
+            within: f64::INFINITY,
+        };
         let (dataset, _) = gridize_remembering(&samples, (&[log(0.005), log(0.1)], Past::Log), &options).unwrap();
         let found = dataset.provenance.relaxation.clone().unwrap();
         let identified = Identified { terms: found.terms.clone(), scale: 1.0 };

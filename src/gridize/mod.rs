@@ -3,7 +3,7 @@
 //! Every number of joints has the same interpolation, linear on the simplices of a Delaunay triangulation, which is
 //! what the paper's TriScatteredInterp and SciPy's LinearNDInterpolator compute: exact for torques linear in q,
 //! continuous, bounded by the measured values, and *absent* outside the convex hull of the samples
-//! ([`Status::Outside`]). One joint: a sorted line. Two: `spade`. Three: tetrahedra of our own on exact predicates.
+//! ([`Status::Outside`]) and, inside it, far from all of them: a hull spans hollows that nobody measured. One joint: a sorted line. Two: `spade`. Three: tetrahedra of our own on exact predicates.
 //! Four to six: the simplices of the grid points alone (see `hyperspace`). Natural neighbours in two joints, where
 //! asked.
 //!
@@ -42,7 +42,7 @@ use crate::{
     error,
     scene::GRID_LINE,
 };
-use cloud::{Cloud, JITTER};
+use cloud::{Cloud, JITTER, distance};
 use interpolant::{Interpolant, Linear};
 use rayon::prelude::*;
 
@@ -61,6 +61,10 @@ const CONTACT_DEVIATIONS: f64 = 3.0;
 
 /// Contact threshold as a fraction of the greatest torque where no deviation was measured.
 const CONTACT_FRACTION: f64 = 0.01;
+
+/// Distance from the samples at which a torque is taken for unknown, in their spacings (1): beyond half the diagonal of a
+/// cube of samples, sqrt(6)/2 = 1.22 with six joints, so that a regular scan has no holes.
+pub const WITHIN: f64 = 1.5;
 
 /// How scattered torques are interpolated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -84,6 +88,9 @@ pub struct GridizeOptions {
     pub interpolation: Interpolation,
     /// Smooth torques within their measured standard deviation first.
     pub smooth: bool,
+    /// Distance from the nearest of its samples up to which a grid point has a torque, in spacings of the samples (1);
+    /// infinite: the convex hull alone ends the measured region. [`WITHIN`] is a good choice.
+    pub within: f64,
 }
 
 /// Report of a gridization.
@@ -95,8 +102,13 @@ pub struct GridizeReport {
     pub merged: usize,
     /// Grid points in all.
     pub points: usize,
-    /// Grid points inside the convex hull.
+    /// Grid points that have a torque.
     pub inside: usize,
+    /// Grid points inside the convex hull that are too far from any sample.
+    pub far: usize,
+    /// Spacing of the samples: the distance to the nearest ones that together lead along all joints, median over the
+    /// samples; for each joint how far that is along it (rad or m).
+    pub spacing: Vec<f64>,
     /// Grid points in contact.
     pub contact_points: usize,
     /// Torque threshold used (N m).
@@ -116,13 +128,17 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
     if !(epsilon.is_finite() && epsilon >= 0.0) {
         return Err(error!("torque threshold {epsilon} is not a number of zero or more"));
     }
+    if options.within.is_nan() || options.within <= 0.0 {
+        return Err(error!("a distance of {} spacings from the samples is not a positive number", options.within));
+    }
     let mut cloud = Cloud::new(samples)?;
     if options.smooth {
         smooth::smooth(&mut cloud)?;
     }
     let grid = grid(samples, &options.steps)?;
     let linear = |pull| (pull, &cloud);
-    let torque = match (options.interpolation, cloud.joints) {
+    let spacing = cloud.spacing();
+    let (mut torque, distances) = match (options.interpolation, cloud.joints) {
         (Interpolation::Natural, 2) => fill(&plane::NaturalNeighbours::new(&cloud)?, &cloud, &grid),
         (Interpolation::Natural, joints) => {
             return Err(error!(
@@ -134,21 +150,29 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         (Interpolation::Linear, 3) => fill_linear(space::Space::new(&cloud)?, linear(HULL_PULL), &grid),
         _ => fill_linear(hyperspace::Hyperspace::new(&cloud), linear(HYPER_PULL), &grid),
     };
-    let (torque, inside) = torque;
+    let is_inside = |distance: f64| distance.is_finite();
+    let is_known = |distance: f64| is_inside(distance) && distance <= options.within * spacing;
     let status: Vec<u8> = torque
-        .chunks_exact(cloud.joints)
-        .zip(&inside)
-        .map(|(torque, inside)| match (inside, torque.iter().map(|t| t * t).sum::<f64>().sqrt() > epsilon) {
-            (false, _) => Status::Outside,
-            (true, true) => Status::Contact,
-            (true, false) => Status::Free,
-        } as u8)
+        .chunks_exact_mut(cloud.joints)
+        .zip(&distances)
+        .map(|(torque, distance)| {
+            if !is_known(*distance) {
+                torque.fill(0.0);
+                Status::Outside as u8
+            } else if torque.iter().map(|t| t * t).sum::<f64>().sqrt() > epsilon {
+                Status::Contact as u8
+            } else {
+                Status::Free as u8
+            }
+        })
         .collect();
     let report = GridizeReport {
         samples: samples.len(),
         merged: cloud.merged,
-        points: inside.len(),
-        inside: inside.iter().filter(|inside| **inside).count(),
+        points: status.len(),
+        inside: status.iter().filter(|status| **status != Status::Outside as u8).count(),
+        far: distances.iter().filter(|distance| is_inside(**distance) && !is_known(**distance)).count(),
+        spacing: cloud.unscaled(spacing),
         contact_points: status.iter().filter(|status| **status == Status::Contact as u8).count(),
         epsilon,
     };
@@ -230,33 +254,33 @@ fn fill_linear<T: interpolant::Triangulation>(
     triangulation: T,
     (pull, cloud): (f64, &Cloud),
     grid: &Grid,
-) -> (Vec<f64>, Vec<bool>) {
+) -> (Vec<f64>, Vec<f64>) {
     fill(&Linear { triangulation, cloud, pull }, cloud, grid)
 }
 
-/// Torque and membership of every grid point. Blocks of fixed size, each with a walk of its own: the same numbers
+/// Torque of every grid point, and the distance to the nearest of the samples that make it, infinite outside the hull. Blocks of fixed size, each with a walk of its own: the same numbers
 /// whatever the number of threads.
-fn fill<I: Interpolant>(interpolant: &I, cloud: &Cloud, grid: &Grid) -> (Vec<f64>, Vec<bool>) {
+fn fill<I: Interpolant>(interpolant: &I, cloud: &Cloud, grid: &Grid) -> (Vec<f64>, Vec<f64>) {
     const BLOCK: usize = 8192;
     let joints = cloud.joints;
     let mut torque = vec![0.0; grid.points() * joints];
-    let mut inside = vec![false; grid.points()];
-    let blocks = torque.par_chunks_mut(BLOCK * joints).zip(inside.par_chunks_mut(BLOCK)).enumerate();
-    blocks.for_each(|(block, (torque, inside))| {
+    let mut distances = vec![f64::INFINITY; grid.points()];
+    let blocks = torque.par_chunks_mut(BLOCK * joints).zip(distances.par_chunks_mut(BLOCK)).enumerate();
+    blocks.for_each(|(block, (torque, distances))| {
         let mut walk = interpolant.walk();
         let mut weights = Vec::with_capacity(MAX_AXES + 1);
-        for (offset, (torque, inside)) in torque.chunks_exact_mut(joints).zip(inside).enumerate() {
-            let q = grid.configuration(block * BLOCK + offset);
-            interpolant.weights(&mut walk, &cloud.scaled(&q), &mut weights);
-            *inside = !weights.is_empty();
+        for (offset, (torque, nearest)) in torque.chunks_exact_mut(joints).zip(distances).enumerate() {
+            let at = cloud.scaled(&grid.configuration(block * BLOCK + offset));
+            interpolant.weights(&mut walk, &at, &mut weights);
             for &(point, weight) in &weights {
+                *nearest = nearest.min(distance(&at, &cloud.positions[point as usize]));
                 for (sum, value) in torque.iter_mut().zip(cloud.torque(point)) {
                     *sum += weight * value;
                 }
             }
         }
     });
-    (torque, inside)
+    (torque, distances)
 }
 
 #[cfg(test)]

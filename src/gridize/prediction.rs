@@ -107,7 +107,13 @@ mod tests {
     }
 
     fn options() -> GridizeOptions {
-        GridizeOptions { steps: vec![0.02], epsilon: None, interpolation: Interpolation::Linear, smooth: false }
+        GridizeOptions {
+            steps: vec![0.02],
+            epsilon: None,
+            interpolation: Interpolation::Linear,
+            smooth: false,
+            within: f64::INFINITY,
+        }
     }
 
     #[test]

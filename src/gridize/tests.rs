@@ -39,7 +39,13 @@ fn lattice(side: usize, joints: usize, step: f64) -> Vec<Vec<f64>> {
 }
 
 fn options(step: f64) -> GridizeOptions {
-    GridizeOptions { steps: vec![step], epsilon: Some(0.0), interpolation: Interpolation::Linear, smooth: false }
+    GridizeOptions {
+        steps: vec![step],
+        epsilon: Some(0.0),
+        interpolation: Interpolation::Linear,
+        smooth: false,
+        within: f64::INFINITY,
+    }
 }
 
 fn linear_field(q: &[f64]) -> f64 {
@@ -148,10 +154,10 @@ fn the_search_without_a_triangulation_agrees_with_the_tetrahedra() {
     let cloud = Cloud::new(&given).unwrap();
     let grid = grid(&given, &[0.05]).unwrap();
     let (pull, cloud) = (HULL_PULL, &cloud);
-    let (a, a_inside) = fill_linear(space::Space::new(cloud).unwrap(), (pull, cloud), &grid);
-    let (b, b_inside) = fill_linear(hyperspace::Hyperspace::new(cloud), (pull, cloud), &grid);
-    assert_eq!(a_inside, b_inside);
-    assert!(a_inside.iter().filter(|inside| **inside).count() > 2000);
+    let (a, a_near) = fill_linear(space::Space::new(cloud).unwrap(), (pull, cloud), &grid);
+    let (b, b_near) = fill_linear(hyperspace::Hyperspace::new(cloud), (pull, cloud), &grid);
+    assert!(a_near.iter().zip(&b_near).all(|(a, b)| a == b));
+    assert!(a_near.iter().filter(|nearest| nearest.is_finite()).count() > 2000);
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-9, "{worst:e}");
 }
@@ -320,4 +326,47 @@ fn smoothing_removes_noise_of_the_measured_size_and_leaves_the_rest() {
     assert!(unchanged.torque[..] == rough.torque[..]);
     noisy.deviations = None;
     assert!(gridize(&noisy, &smooth).err().unwrap().to_string().contains("none was measured"));
+}
+
+#[test]
+fn a_hollow_inside_the_hull_that_nobody_measured_has_no_torque() {
+    let step = 0.05;
+    let is_hollow = |q: &[f64]| (q[0] - 0.5).hypot(q[1] - 0.5) < 0.3;
+    let points: Vec<Vec<f64>> = lattice(21, 2, step).into_iter().filter(|q| !is_hollow(q)).collect();
+    let given = samples(&points, linear_field);
+    let whole = gridize(&given, &options(0.02)).unwrap();
+    let (dataset, report) = gridize(&given, &GridizeOptions { within: WITHIN, ..options(0.02) }).unwrap();
+    assert!(report.spacing.iter().all(|spacing| (spacing - step).abs() < 1e-12));
+    assert_eq!((whole.1.far, whole.1.inside), (0, whole.1.points));
+    assert!(report.far > 200 && report.far + report.inside == report.points);
+    for p in 0..dataset.grid.points() {
+        let q = dataset.grid.configuration(p);
+        let nearest = points.iter().map(|x| (x[0] - q[0]).hypot(x[1] - q[1])).fold(f64::INFINITY, f64::min);
+        let is_known = dataset.status(p) != Status::Outside;
+        // Beside the hollow the triangle that spans it may have other corners than the nearest sample.
+        assert!(if is_known { nearest <= WITHIN * step } else { is_hollow(&q) }, "{q:?}, {nearest}");
+        let kept = if is_known { std::array::from_fn(|k| whole.0.torque(p)[k]) } else { [0.0; 2] };
+        assert_eq!(dataset.torque(p), kept);
+    }
+    for within in [0.0, -1.0, f64::NAN] {
+        let error = gridize(&given, &GridizeOptions { within, ..options(0.02) }).err().unwrap().to_string();
+        assert!(error.contains("spacings from the samples"), "{error}");
+    }
+}
+
+#[test]
+fn regular_scans_have_no_holes_however_finely_their_lines_are_divided() {
+    for (joints, side) in [(1, 12), (2, 12), (3, 8), (4, 5), (5, 4)] {
+        for (fine, sheared) in [(1.0, 0.0), (0.2, 0.0), (0.2, 0.5)] {
+            let mut points = lattice(side, joints, 0.1);
+            points.iter_mut().for_each(|q| {
+                q[0] = fine * q[0] + sheared * q[joints - 1];
+            });
+            let near = GridizeOptions { within: WITHIN, ..options(0.07) };
+            let (_, report) = gridize(&samples(&points, linear_field), &near).unwrap();
+            let longest = if joints == 1 { 0.1 * (fine + sheared) } else { 0.1 };
+            assert!(report.spacing[0] < 1.2 * longest, "{joints} joints: {}", report.spacing[0]);
+            assert_eq!(report.far, 0, "{joints} joints");
+        }
+    }
 }

@@ -22,5 +22,5 @@ pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere
 pub use dynamics::Dynamics;
 pub use links::Links;
 pub(crate) use posture::outer;
-pub use posture::{Posture, of_last_link};
+pub use posture::{Posture, of_last_link, tip};
 pub use press::{PRESS_GAP, Press};

@@ -65,6 +65,14 @@ pub fn of_last_link(chain: &Chain) -> impl Iterator<Item = usize> {
     (0..chain.nodes.len()).filter(move |&node| chain.nodes[node].link == last)
 }
 
+/// The tip of the arm: of the contact nodes of its last link, the one that is farthest from its joint. None where the arm
+/// has no contact node.
+#[must_use]
+pub fn tip(chain: &Chain) -> Option<usize> {
+    let far = |node: &usize| chain.nodes[*node].position.length();
+    of_last_link(chain).max_by(|a, b| far(a).total_cmp(&far(b)))
+}
+
 /// The unit vector n, and J J^T of the node that moves most.
 fn easiest(chain: &Chain, pose: &Pose) -> (DVec3, DMat3) {
     let columns = |node: usize| (0..chain.joints.len()).map(move |joint| chain.jacobian_column(pose, node, joint));

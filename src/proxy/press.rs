@@ -22,7 +22,11 @@ const DEPTH: f64 = 0.35;
 
 /// How deep the node scrapes, and how far to either side, over that length (1).
 const SCRAPE_DEPTH: f64 = 0.2;
-const SCRAPE_WAY: f64 = 0.5;
+const SCRAPE_WAYS: [f64; 4] = [0.5, 0.35, 0.25, 0.15];
+
+/// Greatest depth of the node at a corner of the grid, over that length (1): beyond about a third of a ball's radius contact
+/// at rest errs, and beyond the centre nothing is right. The first way of scraping that keeps it is taken.
+const DEEPEST: f64 = 0.5;
 
 /// Ends of a stroke, over that way (1): to both sides of the point that is pressed, or where a limit is near, or an arm
 /// is stretched, to one.
@@ -31,7 +35,8 @@ const STROKES: [[f64; 2]; 3] = [[-1.0, 1.0], [-2.0, 0.0], [0.0, 2.0]];
 /// How far the node may be from the end of a stroke, over that length (1): a twentieth of its depth.
 const SCRAPE_ERROR: f64 = 0.01;
 
-/// By how much the grid reaches beyond the motion at the node, over that length, and at most (1, rad).
+/// By how much the grid reaches beyond the motion at the node with all joints together, over that length, and with each
+/// at most (1, rad).
 const MARGIN: f64 = 0.2;
 const MOST_MARGIN: f64 = 0.15;
 
@@ -80,16 +85,28 @@ impl Press {
             q
         };
         let [start, end] = [-PRESS_GAP, PRESS_GAP + DEPTH].map(|way| moved(way * length));
-        let scrape = stroke(chain, moved((PRESS_GAP + SCRAPE_DEPTH) * length), node, direction, length);
-        let mut axes = Vec::new();
-        for (j, joint) in chain.joints.iter().enumerate() {
-            let most = if joint.kind == JointKind::Revolute { MOST_MARGIN } else { length };
-            let margin = (MARGIN * length / columns[j].length()).min(most).max(LEAST_MARGIN);
-            let ways = [start[j], end[j]].into_iter().chain(scrape.iter().flatten().map(|end| end[j]));
-            let (least, greatest) = ways.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-            let range = [least - margin, greatest + margin];
-            axes.push((range.map(|end| within(joint, end)), LINES[q.len().clamp(1, LINES.len()) - 1]));
-        }
+        let scraping = moved((PRESS_GAP + SCRAPE_DEPTH) * length);
+        let strokes = SCRAPE_WAYS.map(|way| stroke(chain, scraping, node, direction, [length, way * length]));
+        let grids = strokes.into_iter().chain([None]).map(|scrape| {
+            let corners = [start, end].into_iter().chain(scrape.into_iter().flatten());
+            (scrape, Self::around(chain, &columns, length, corners))
+        });
+        let depth = |axes: &[([f64; 2], usize)]| {
+            let deepest = (0..1_usize << axes.len()).map(|corner| {
+                let q: Vec<f64> = axes.iter().enumerate().map(|(j, (range, _))| range[corner >> j & 1]).collect();
+                let mut pose = chain.new_pose();
+                chain.pose(&q, &mut pose);
+                pose.nodes[node].dot(direction)
+            });
+            deepest.fold(f64::NEG_INFINITY, f64::max) - pose.nodes[node].dot(direction) - PRESS_GAP * length
+        };
+        let grids: Vec<_> = grids.collect();
+        let (scrape, axes) = grids
+            .iter()
+            .find(|(_, axes)| depth(axes) <= DEEPEST * length)
+            .or(grids.last())
+            .cloned()
+            .unwrap_or_default();
         let longest = columns.iter().map(|column| column.length()).fold(0.0, f64::max);
         let levers = columns.iter().zip(&chain.joints).map(|(column, joint)| match joint.kind {
             JointKind::Revolute => column.length().max(SHORTEST_LEVER * longest).clamp(LEVERS[0], LEVERS[1]),
@@ -97,6 +114,27 @@ impl Press {
         });
         let levers = JointVector::from_slice(&levers.collect::<Vec<_>>());
         Self { axes, motion: [start, end], scrape, levers }
+    }
+
+    /// The axes of a grid around `corners`, beyond which it reaches at the node, whose motion with each joint `columns`
+    /// has (m/rad, or 1).
+    fn around(
+        chain: &Chain,
+        columns: &[DVec3],
+        length: f64,
+        corners: impl Iterator<Item = JointVector> + Clone,
+    ) -> Vec<([f64; 2], usize)> {
+        let count = columns.len();
+        let axis = |(j, joint): (usize, &JointSpec)| {
+            let most = if joint.kind == JointKind::Revolute { MOST_MARGIN } else { length };
+            let margin = MARGIN * length / (count as f64 * columns[j].length());
+            let margin = margin.min(most).max(LEAST_MARGIN);
+            let ends = corners.clone().map(|q| q[j]);
+            let (least, greatest) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+            let range = [least - margin, greatest + margin];
+            (range.map(|end| within(joint, end)), LINES[count.clamp(1, LINES.len()) - 1])
+        };
+        chain.joints.iter().enumerate().map(axis).collect()
     }
 
     /// Number of the grid's points.
@@ -145,20 +183,28 @@ impl Press {
     }
 }
 
-/// Ends of a stroke of `node` across `direction` about where it is at `q`; `None` where the joints do not get there.
-fn stroke(chain: &Chain, q: JointVector, node: usize, direction: DVec3, length: f64) -> Option<[JointVector; 2]> {
+/// Ends of a stroke of `node` across `direction` about where it is at `q`, `way` to either side over something of the
+/// length `length` (m); `None` where the joints do not get there.
+fn stroke(
+    chain: &Chain,
+    q: JointVector,
+    node: usize,
+    direction: DVec3,
+    [length, way]: [f64; 2],
+) -> Option<[JointVector; 2]> {
     let mut pose = chain.new_pose();
     chain.pose(&q, &mut pose);
     let across = |x: DVec3| x - x.dot(direction) * direction;
     let columns = (0..q.len()).map(|joint| across(chain.jacobian_column(&pose, node, joint)));
     let square = columns.fold(DMat3::ZERO, |sum, column| sum + outer(column));
-    let way = largest(square, direction.any_orthonormal_vector());
-    let end = |way: DVec3| {
-        let (mut end, error) = approach(chain, node, pose.nodes[node] + SCRAPE_WAY * length * way, &q);
+    let along = largest(square, direction.any_orthonormal_vector());
+    let end = |to: DVec3| {
+        let (mut end, error) = approach(chain, node, pose.nodes[node] + way * to, &q);
         end.iter_mut().zip(&chain.joints).for_each(|(q, joint)| *q = within(joint, *q));
         (error <= SCRAPE_ERROR * length).then_some(end)
     };
-    let strokes = [way, direction.cross(way)].into_iter().flat_map(|way| STROKES.map(|ends| ends.map(|end| end * way)));
+    let strokes =
+        [along, direction.cross(along)].into_iter().flat_map(|way| STROKES.map(|ends| ends.map(|end| end * way)));
     strokes.into_iter().find_map(|[from, to]| Some([end(from)?, end(to)?]))
 }
 

@@ -55,8 +55,8 @@ pub(super) struct Pending<'a> {
     pub interval: f64,
     /// v_hat of the step before (rad/s or m/s).
     pub velocity: JointVector,
-    /// Forces beside friction.
-    pub load: Load,
+    /// Forces beside friction, which adds its own.
+    pub load: &'a mut Load,
 }
 
 impl FrictionState {
@@ -79,13 +79,13 @@ impl Friction {
     /// The `pending` step of the proxy, whose contacts slip as `slip` says. Books into `extra`. Never allocates.
     pub fn step(
         &self,
-        pending: &Pending<'_>,
+        pending: Pending<'_>,
         slip: &Slip,
         state: &mut FrictionState,
         motion: &mut Motion,
         extra: &mut Extra,
     ) -> Step {
-        let &Pending { npmi, stage, interval, velocity, ref load } = pending;
+        let Pending { npmi, stage, interval, velocity, load } = pending;
         let reach = |coefficient| coefficient * slip.normal_force / self.stiffness;
         let sticking = reach(if state.slid { self.kinetic } else { self.stiction });
         let mut start = state.deflection.shortened(sticking);
@@ -101,18 +101,17 @@ impl Friction {
             alpha = (kinetic / moved(&start, slip, interval, &velocity).norm()).min(1.0);
         }
         let before = *motion;
-        let solve = |alpha: f64, motion: &mut Motion| {
-            let step = npmi.advance(stage, motion, interval, &self.loaded(load, slip, &start, alpha, interval));
-            let end = moved(&start, slip, interval, &step.velocity);
-            let mut kept = end;
-            kept.iter_mut().for_each(|z| *z *= alpha);
-            (step, end, kept)
-        };
-        let (mut step, mut end, mut kept) = solve(alpha, motion);
+        self.add_to(load, slip, &start, interval * alpha, 1.0 + alpha);
+        let mut step = npmi.advance(stage, motion, interval, load);
+        let mut end = moved(&start, slip, interval, &step.velocity);
+        let mut kept = end.scaled(alpha);
         if alpha < 1.0 && start.dot(&kept) + kept.dot(&kept) < 0.0 {
+            self.add_to(load, slip, &start, interval * (1.0 - alpha), 1.0 - alpha);
             alpha = 1.0;
             *motion = before;
-            (step, end, kept) = solve(alpha, motion);
+            step = npmi.advance(stage, motion, interval, load);
+            end = moved(&start, slip, interval, &step.velocity);
+            kept = end;
         }
         let works = (0..start.len()).map(|a| (start[a] + kept[a]) * (end[a] - start[a]));
         extra.friction_work = -0.5 * self.stiffness * works.sum::<f64>();
@@ -125,22 +124,18 @@ impl Friction {
         step
     }
 
-    /// The load of the step and friction, whose deflection goes from `start` z to `alpha` z*:
-    /// `tau = -k/2 B ((1 + alpha) z + alpha B T v_hat)`.
-    fn loaded(&self, load: &Load, slip: &Slip, start: &JointVector, alpha: f64, interval: f64) -> Load {
-        let mut load = *load;
-        slip.add_damper(0.5 * self.stiffness * interval * alpha, &mut load.damping, start.len());
-        let force = 0.5 * self.stiffness * (1.0 + alpha);
+    /// Adds to `load` friction whose deflection goes from `start` z to alpha z*, `tau = -k/2 B (held z + time B v_hat)`
+    /// with `held` 1 + alpha and `time` alpha T.
+    fn add_to(&self, load: &mut Load, slip: &Slip, start: &JointVector, time: f64, held: f64) {
+        slip.add_damper(0.5 * self.stiffness * time, &mut load.damping, start.len());
+        let force = 0.5 * self.stiffness * held;
         for (torque, row) in load.torque.iter_mut().zip(&slip.jacobian) {
             *torque -= force * start.dot(row);
         }
-        load
     }
 }
 
 /// z + B T v (m).
 fn moved(start: &JointVector, slip: &Slip, interval: f64, velocity: &JointVector) -> JointVector {
-    let mut way = *velocity;
-    way.iter_mut().for_each(|rate| *rate *= interval);
-    slip.deflected(start, &way)
+    slip.deflected(start, &velocity.scaled(interval))
 }

@@ -48,6 +48,8 @@ pub struct Haptics {
     control: Option<PassivityControl>,
     friction: Option<Friction>,
     relaxation: Option<Relaxation>,
+    /// Whether one of them needs to know how contacts slip.
+    slips: bool,
     watchdog: Watchdog,
     torque_limit: JointVector,
     torque_rate_limit: JointVector,
@@ -145,6 +147,7 @@ impl Haptics {
             control,
             friction: spec.friction.as_ref().map(Friction::new),
             relaxation: spec.relaxation.as_ref().map(|spec| Relaxation::new(spec, period)),
+            slips: spec.uses_slip(),
             watchdog,
             torque_limit,
             torque_rate_limit,
@@ -354,25 +357,25 @@ impl Haptics {
             rate = control.proxy_rate(&state.accounts, interval, &state.motion);
             stage.add_inertia(rate, &mut load.damping);
         }
-        let mut slip = Slip::default();
-        if self.friction.is_some() || self.relaxation.is_some_and(|relaxation| relaxation.needs_slip()) {
-            slip = contact.slip(&state.motion.position, elastic);
-            slip.normal_force *= remembered.share;
+        let slip = self.slips.then(|| {
+            let slip = contact.slip(&state.motion.position, elastic);
+            Slip { normal_force: remembered.share * slip.normal_force, ..slip }
+        });
+        let mut drag = None;
+        if let (Some(relaxation), Some(memory), Some(slip)) = (&self.relaxation, &state.memory, &slip) {
+            let damper = relaxation.drag(memory, elastic.energy, slip, &state.proxy_velocity, &mut load);
+            drag = Some((slip, damper));
         }
-        let mut damper = 0.0;
-        if let (Some(relaxation), Some(memory)) = (&self.relaxation, &state.memory) {
-            damper = relaxation.drag(memory, elastic.energy, &slip, &state.proxy_velocity, &mut load);
-        }
-        let step = match (&self.friction, &mut state.friction) {
-            (Some(friction), Some(memory)) => {
+        let step = match (&self.friction, &mut state.friction, &slip) {
+            (Some(friction), Some(memory), Some(slip)) => {
                 let velocity = state.proxy_velocity;
-                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, velocity, load };
-                friction.step(&pending, &slip, memory, &mut state.motion, &mut extra)
+                let pending = Pending { npmi: &self.npmi, stage: &stage, interval, velocity, load: &mut load };
+                friction.step(pending, slip, memory, &mut state.motion, &mut extra)
             }
             _ => self.npmi.advance(&stage, &mut state.motion, interval, &load),
         };
         if let (Some(relaxation), Some(memory)) = (&self.relaxation, &mut state.memory) {
-            extra.drag = relaxation.depart(memory, interval, &step.velocity, &slip, damper);
+            extra.drag = relaxation.depart(memory, interval, &step.velocity, drag);
         }
         extra.control_dissipation = interval * rate * stage.twice_kinetic_energy(&step.velocity);
         state.proxy_velocity = step.velocity;

@@ -5,14 +5,16 @@
 //! ([`GREATEST_POSITION_AGE`](super::watchdog::GREATEST_POSITION_AGE)); then the loop fails
 //! ([`Fault::Unsolved`](super::flags::Fault::Unsolved)).
 
+use super::object_history::ObjectHistory;
 use crate::{
     Error, JointMatrix, JointVector,
     contact::{Equilibrium, LiveContact, LiveSolver, Model, Slip, Solvers, Status},
     dataset::{Axis, Dataset, Grid, Surface},
+    error,
     field::{Flags, Sample},
     joint_matrix::greatest_eigenvalue,
     object::Object,
-    scene::{ContactLaw, Scene},
+    scene::{ContactLaw, EFFECTS, Effect, RelaxationSpec, Scene},
     sweep::{CpuBackend, Direct, build_object, sample, shallow},
 };
 
@@ -31,6 +33,8 @@ pub struct LiveScene {
     /// Tangents d tau/d q in shallow contact, over the scene's grid (N m/rad).
     tangents: Vec<JointMatrix>,
     follows: bool,
+    /// Where the object remembers node by node: see [`LiveScene::remembering`].
+    relaxation: Option<RelaxationSpec>,
 }
 
 impl LiveScene {
@@ -43,6 +47,23 @@ impl LiveScene {
         Self::of(scene, object)
     }
 
+    /// The same with an object that relaxes node by node, with its whole history, and not by one number a term: the
+    /// reference of the loop's own relaxation. Each sample lets a tick go by. Nothing is drawn.
+    ///
+    /// # Errors
+    /// As [`LiveScene::new`]; when the scene names no relaxation.
+    pub fn remembering(scene: &Scene) -> Result<Self, Error> {
+        let Some(relaxation) = scene.haptics.relaxation.clone() else {
+            return Err(error!(
+                "{}: the scene names no [object.relaxation], so that its object has no memory",
+                scene.path.display()
+            ));
+        };
+        let felt = |effect: &Effect| effect.is_named(scene) && !effect.is_drawn() && effect.key != "relaxation";
+        let others: Vec<Effect> = EFFECTS.into_iter().filter(felt).collect();
+        Ok(Self { relaxation: Some(relaxation), ..Self::new(scene.with_effects(false, &others)?)? })
+    }
+
     /// The same with the `object` of the scene, which was built before.
     ///
     /// # Errors
@@ -53,7 +74,7 @@ impl LiveScene {
         let direct = Direct::of(&scene, object)?;
         let grid = region(&scene, direct.model().compliance.is_whole());
         let tangents = tangents(direct.model(), &sample(&scene));
-        Ok(Self { scene, direct, grid, tangents, follows })
+        Ok(Self { scene, direct, grid, tangents, follows, relaxation: None })
     }
 
     /// The scene.
@@ -147,7 +168,9 @@ fn tangents(model: &Model<'_>, configurations: &[JointVector]) -> Vec<JointMatri
 
 /// The contact of a [`LiveScene`] in one session.
 pub struct LiveSession<'a> {
+    model: &'a Model<'a>,
     solver: LiveSolver<'a>,
+    history: Option<ObjectHistory>,
     /// What was felt last, and how many ticks ago it was solved.
     felt: Sample,
     age: u32,
@@ -160,13 +183,21 @@ impl<'a> LiveSession<'a> {
     pub fn new(scene: &'a LiveScene) -> Self {
         let model = scene.direct.model();
         let felt = Sample { torque: JointVector::zeros(model.chain.joints.len()), share: 1.0, ..Sample::default() };
-        Self { solver: LiveSolver::new(model), felt, age: 0, slip: Slip::default() }
+        let period = 1.0 / scene.scene.haptics.rate;
+        let history = scene.relaxation.as_ref().map(|spec| ObjectHistory::new(spec, period, model));
+        Self { model, solver: LiveSolver::new(model), history, felt, age: 0, slip: Slip::default() }
     }
 
     /// Contact at `q`, and how many ticks ago it was solved. Never allocates.
     pub(super) fn sample(&mut self, q: &[f64]) -> (Sample, u32) {
-        let LiveContact { status, energy, torque, contact_nodes, .. } = self.solver.solve(q);
+        if let Some(history) = &mut self.history {
+            self.solver.stand(history.standing());
+        }
+        let LiveContact { status, mut energy, torque, contact_nodes, .. } = self.solver.solve(q);
         if matches!(status, Status::Free | Status::Contact) {
+            if let Some(history) = &mut self.history {
+                energy += history.pass(self.model, &self.solver);
+            }
             let contact = status == Status::Contact;
             let (index, flags) = (f64::from(u8::from(contact)), Flags::empty());
             (self.felt, self.age) = (Sample { torque, index, contact, contact_nodes, energy, share: 1.0, flags }, 0);

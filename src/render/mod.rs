@@ -16,6 +16,7 @@ mod inputs;
 pub mod live;
 pub mod mcap;
 pub mod npmi;
+mod object_history;
 mod object_memory;
 pub mod object_motion;
 mod own_motion;

@@ -36,13 +36,19 @@ impl ObjectMemory {
         Self { terms: spec.terms.iter().map(term).collect(), held: past }
     }
 
-    /// Returns the body force that the object's past makes (N), and lets one frame under contact `forces` beside it go
-    /// by.
-    pub fn frame(&mut self, forces: &[DVec3]) -> &[DVec3] {
+    /// The body force that the object's past makes (N).
+    pub fn past(&mut self) -> &[DVec3] {
         self.held.fill(DVec3::ZERO);
         for Term { share, past, .. } in &self.terms {
             self.held.iter_mut().zip(past).for_each(|(held, past)| *held += *share * *past);
         }
+        &self.held
+    }
+
+    /// Returns the body force that the object's past makes (N), and lets one frame under contact `forces` beside it go
+    /// by.
+    pub fn frame(&mut self, forces: &[DVec3]) -> &[DVec3] {
+        self.past();
         for Term { factor, past, .. } in &mut self.terms {
             for ((past, force), held) in past.iter_mut().zip(forces).zip(&self.held) {
                 let whole = *force + *held;
@@ -50,6 +56,15 @@ impl ObjectMemory {
             }
         }
         &self.held
+    }
+
+    /// Of displacements z_i, what they store with their `forces` y_i, `(sum g_i z_i . y_i - s . h) / 2` with the bodies'
+    /// own past s and h (J).
+    pub fn stored(&mut self, forces: &mut Self) -> f64 {
+        let dot = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
+        let terms = self.terms.iter().zip(&forces.terms);
+        let all: f64 = terms.map(|(z, y)| z.share * dot(&z.past, &y.past)).sum();
+        0.5 * (all - dot(self.past(), forces.past()))
     }
 
     /// Forgets all.

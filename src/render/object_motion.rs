@@ -99,8 +99,12 @@ impl<'object> ObjectMotion<'object> {
 
     /// Positions n = n0 + N u of the object's nodes (m).
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = DVec3> {
-        let attachment = &self.mechanics.attachment;
-        self.object.rest.iter().enumerate().map(|(node, rest)| rest + attachment.follow(node, &self.displacement))
+        self.object.rest.iter().zip(self.displacements()).map(|(rest, displacement)| rest + displacement)
+    }
+
+    /// Displacements N u of the object's nodes (m).
+    pub fn displacements(&self) -> impl ExactSizeIterator<Item = DVec3> {
+        (0..self.object.rest.len()).map(|node| self.mechanics.attachment.follow(node, &self.displacement))
     }
 
     /// Displacements u of the nodes of K (m).

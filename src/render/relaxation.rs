@@ -15,9 +15,10 @@
 //! that it would not give without memory, whatever the motion.
 //!
 //! *Sliding* meets fresh material: over a way s of slip ([`crate::contact::Slip`]) each z_i falls by `exp(-s / l)`, l
-//! the distance from a point of contact at which its dent is 1/e as deep. Where that raises H, it is paid by a drag of
-//! size `P = sum g_i (w - z_i)+ z_i / l` against the slip, a damper `P / |slip rate|` that is implicit in the step. Where
-//! the drag took less than H would rise, z falls by so much less, H being convex in it.
+//! the way over which the arm leaves its dent: one of the same forces so far beside has 1/e of the energy in common with
+//! it, under a single point where its dent is 1/e as deep. Where forgetting raises H, it is paid by a drag of size
+//! `P = sum g_i (w - z_i)+ z_i / l` against the slip, a damper `P / |slip rate|` that is implicit in the step. Where the
+//! drag took less than H would rise, z falls by so much less, H being convex in it.
 
 use super::npmi::Load;
 use crate::{
@@ -34,6 +35,8 @@ const CREEP: f64 = 0.05;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Relaxation {
     terms: [Term; MOST_TERMS],
+    /// g_0 (1).
+    lasting: f64,
     /// 1 / l (1/m); zero where sliding forgets nothing.
     forgetting: f64,
     /// Slip rate below which the drag is viscous (m/s).
@@ -90,7 +93,8 @@ impl Relaxation {
         let slowest = terms.iter().fold(0.0, |slowest: f64, term| slowest.max(term.time));
         let forgetting = spec.dent.map_or(0.0, f64::recip);
         let creep = if forgetting > 0.0 { CREEP / (forgetting * slowest) } else { 0.0 };
-        Self { terms, forgetting, creep, period }
+        let lasting = 1.0 - terms.iter().map(|term| term.share).sum::<f64>();
+        Self { terms, lasting, forgetting, creep, period }
     }
 
     /// Brings `memory` up to date where the elastic energy is `energy` U (J). Never allocates.
@@ -102,8 +106,8 @@ impl Relaxation {
         }
         if memory.elapsed > 0.0 {
             let towards = w.max(self.separation(&memory.z));
+            let is_nominal = memory.elapsed == self.period;
             for (z, term) in memory.z.iter_mut().zip(&self.terms).filter(|(_, term)| term.share > 0.0) {
-                let is_nominal = memory.elapsed == self.period;
                 let factor = if is_nominal { term.factor } else { (-memory.elapsed / term.time).exp() };
                 *z = towards + (*z - towards) * factor;
                 super::npmi::flush(z);
@@ -123,6 +127,9 @@ impl Relaxation {
     /// Adds the drag of sliding to `load`, with the elastic energy U (J) and the slip rate of the step before (m/s).
     /// Returns its damper (N s/m), for [`Relaxation::depart`].
     pub fn drag(&self, memory: &Memory, energy: f64, slip: &Slip, velocity: &JointVector, load: &mut Load) -> f64 {
+        if self.forgetting <= 0.0 {
+            return 0.0;
+        }
         let w = (2.0 * energy.max(0.0)).sqrt();
         let fresh = self.terms.iter().zip(&memory.z).map(|(term, z)| term.share * (w - z).max(0.0) * z);
         let force = self.forgetting * fresh.sum::<f64>();
@@ -134,21 +141,22 @@ impl Relaxation {
         damper
     }
 
-    /// Takes in a step over `interval` (s) with the proxy at `velocity`, its slip and the `damper` of the drag, and
-    /// returns what the drag took (J).
-    pub fn depart(&self, memory: &mut Memory, interval: f64, velocity: &JointVector, slip: &Slip, damper: f64) -> f64 {
+    /// Takes in a step over `interval` (s) with the proxy at `velocity`, its slip and the damper of the drag where they
+    /// are known, and returns what the drag took (J).
+    pub fn depart(
+        &self,
+        memory: &mut Memory,
+        interval: f64,
+        velocity: &JointVector,
+        drag: Option<(&Slip, f64)>,
+    ) -> f64 {
         memory.elapsed = interval;
-        if self.forgetting > 0.0 {
+        if let Some((slip, damper)) = drag.filter(|_| self.forgetting > 0.0) {
             let rate = slip.rate(velocity);
             memory.slid = interval * rate;
             memory.drag = interval * damper * rate * rate;
         }
         memory.drag
-    }
-
-    /// Whether it needs to know how contacts slip.
-    pub fn needs_slip(&self) -> bool {
-        self.forgetting > 0.0
     }
 
     /// Lets each z fall over the way that was slid, by as much as the drag has paid for.
@@ -168,9 +176,7 @@ impl Relaxation {
     /// H at w, or at w_s where that is more (J).
     fn stored(&self, w: f64, z: &[f64; MOST_TERMS]) -> f64 {
         let w = w.max(self.separation(z));
-        let pairs = || self.terms.iter().zip(z);
-        let lasting = 1.0 - pairs().map(|(term, _)| term.share).sum::<f64>();
-        let fading: f64 = pairs().map(|(term, z)| term.share * (w - z) * (w - z)).sum();
-        0.5 * (lasting * w * w + fading)
+        let fading: f64 = self.terms.iter().zip(z).map(|(term, z)| term.share * (w - z) * (w - z)).sum();
+        0.5 * (self.lasting * w * w + fading)
     }
 }

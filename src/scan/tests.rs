@@ -343,7 +343,8 @@ fn recorded_presses_tell_how_the_block_relaxes_and_holds_back() {
     let histories = log.histories();
     assert_eq!((histories.len(), log.samples().len()), (45, 135));
     let interpolation = crate::gridize::Interpolation::Linear;
-    let options = GridizeOptions { steps: vec![0.03], epsilon: Some(0.01), interpolation, smooth: false };
+    let options =
+        GridizeOptions { steps: vec![0.03], epsilon: Some(0.01), interpolation, smooth: false, within: f64::INFINITY };
     let (mut dataset, _) = gridize_remembering(&log.samples(), (&histories, Past::Presses), &options).unwrap();
     let found = dataset.provenance.relaxation.clone().unwrap();
     assert_eq!(found.terms.len(), 2, "{found:?}");

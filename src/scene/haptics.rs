@@ -177,6 +177,9 @@ pub struct HandSpec {
     pub inertia: JointVector,
 }
 
+/// Damping of the proxy over the stiffness of its coupling where the scene leaves it out (s): the proxy lags behind the
+/// device by no more than a tick. That of a desktop device's defaults.
+const PROXY_LAG: f64 = 1e-3;
 /// Highest rate of the loop (Hz): a tick takes some microseconds.
 const HIGHEST_RATE: f64 = 1e5;
 /// Default channels of the four-channel coupling: both force channels whole, half of the inertias (see `coupling.rs`).
@@ -240,6 +243,10 @@ impl HapticsSpec {
         let gains = GAINS.into_iter().map(|(list, _)| list).chain(OF_THE_DEVICE).map(|list| ("haptics", list));
         for (table, (key, list, default)) in gains.chain(OF_THE_HAND.map(|list| ("haptics.hand", list))) {
             checker.fit(&format!("{table}.{key}"), list(self), joints, |kind| default.of(kind))?;
+        }
+        if self.proxy_damping_is_free {
+            let stiffness = self.coupling_stiffness;
+            self.proxy_damping.iter_mut().zip(stiffness.iter()).for_each(|(damping, k)| *damping = PROXY_LAG * k);
         }
         let Some(FrictionSpec { coefficient, static_coefficient: Some(most), .. }) = self.friction else {
             return Ok(());

@@ -14,8 +14,9 @@ pub const MOST_TERMS: usize = 4;
 pub struct RelaxationSpec {
     /// Share g_i of the force that fades, in sum below one, and the time theta_i in which it does (1, s).
     pub terms: Vec<[f64; 2]>,
-    /// Distance from a point of contact at which its dent is 1/e as deep: the way over which the arm meets fresh material
-    /// as it slides. Without, what was under the arm stays there (m).
+    /// Way over which an arm that slides leaves its dent and meets fresh material: a dent of the same forces so far beside
+    /// has 1/e of the energy in common with it; under a single point it is 1/e as deep there. Without, what was under
+    /// the arm stays there (m).
     #[serde(deserialize_with = "positive", default)]
     pub dent: Option<f64>,
 }

@@ -21,6 +21,10 @@ pub struct Inspection {
     pub gap: f64,
     /// tau (N m or N).
     pub torque: Vec<f64>,
+    /// Way over which an arm that slides leaves its dent: see [`crate::scene::RelaxationSpec::dent`]. Mean over all
+    /// directions; none without contact (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dent: Option<f64>,
     /// All contact nodes of the proxy.
     pub proxy_nodes: Vec<ProxyNode>,
     /// All nodes of the object's surface.
@@ -99,8 +103,36 @@ impl Inspection {
             energy,
             gap,
             torque: torque.to_vec(),
+            dent: dent(&object_nodes),
             proxy_nodes,
             object_nodes,
         }
+    }
+}
+
+/// Radius of a disc as large as the surface over which the forces can be moved until their dent has 1/e of the energy in
+/// common with the one that is there, `f . u`, each force moved to the nearest node. Where the object is smaller, the way
+/// to its farthest node over the logarithm of what is in common there (m).
+fn dent(nodes: &[ObjectNode]) -> Option<f64> {
+    let loaded: Vec<&ObjectNode> = nodes.iter().filter(|node| node.force != DVec3::ZERO).collect();
+    let heaviest = loaded.iter().max_by(|a, b| a.force.length().total_cmp(&b.force.length()))?;
+    let nearest = |place: DVec3| {
+        nodes.iter().min_by(|a, b| a.rest.distance_squared(place).total_cmp(&b.rest.distance_squared(place)))
+    };
+    let shared = |moved: DVec3| -> f64 {
+        let of = |on: &&ObjectNode| nearest(on.rest + moved).map(|at| on.force.dot(at.position - at.rest));
+        loaded.iter().filter_map(of).sum()
+    };
+    let whole = shared(DVec3::ZERO);
+    let of = |node: &ObjectNode| {
+        let way = node.rest - heaviest.rest;
+        (way.length(), shared(way) / whole)
+    };
+    let mut ways: Vec<(f64, f64)> = nodes.iter().map(of).collect();
+    ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let within = ways.iter().filter(|(_, share)| *share > 1.0 / std::f64::consts::E).count();
+    match ways.get(within) {
+        Some((way, _)) => Some(*way),
+        None => ways.last().map(|(way, share)| way / -share.ln()),
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     Error, JointVector,
     contact::{Model, Proximity},
     object::{Object, corners},
-    proxy::{Chain, PRESS_GAP, Posture, Press, inverse_kinematics::approach, of_last_link},
+    proxy::{Chain, PRESS_GAP, Posture, Press, inverse_kinematics::approach, tip},
     random::Random,
     scene::Scene,
 };
@@ -120,7 +120,7 @@ impl Placing {
         middle.iter_mut().zip(&chain.joints).for_each(|(q, joint)| *q = 0.5 * (joint.limits[0] + joint.limits[1]));
         let mut pose = chain.new_pose();
         chain.pose(&middle, &mut pose);
-        let tip = posture.map_or_else(|| farthest(&chain), |posture| posture.node);
+        let tip = posture.map(|posture| posture.node).or_else(|| tip(&chain)).unwrap_or(0);
         let at = pose.nodes[tip];
         let body = corners(&object.rest[..object.surface_nodes]);
         let length = length(body);
@@ -230,12 +230,6 @@ impl Attempt {
             (here, _) => here,
         }
     }
-}
-
-/// The contact node at the end of the arm: of the last link with nodes, the one that is farthest from its joint.
-fn farthest(chain: &Chain) -> usize {
-    let far = |node: &usize| chain.nodes[*node].position.length();
-    of_last_link(chain).max_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(0)
 }
 
 /// Length by which a press on a body of these corners is measured (m).

@@ -9,7 +9,7 @@ use super::group::Group;
 use super::robot::{Joint, JointType, Robot};
 use super::{Inertial, Placed};
 use crate::Error;
-use crate::MAX_AXES;
+use crate::MAX_JOINTS;
 use crate::scene::JointKind;
 use glam::{DAffine3, DQuat, DVec3};
 use std::collections::HashMap;
@@ -75,7 +75,7 @@ impl Arm {
     /// Returns the chain of `robot` to the link `tip`, joints of `locks` held.
     ///
     /// # Errors
-    /// If `tip` or a lock names nothing, a lock is outside its limits, there are more than six joints or none, or a
+    /// If `tip` or a lock names nothing, a lock is outside its limits, there are more than twelve joints or none, or a
     /// joint on the way is one that a scene does not have.
     pub fn new(robot: &Robot, tip: &str, locks: &[Lock]) -> Result<Self, Error> {
         let held = held(robot, locks)?;
@@ -85,12 +85,12 @@ impl Arm {
             .filter(|number| !held.contains_key(*number))
             .map(|&number| robot.joints[number].name.as_str())
             .collect();
-        if moving.is_empty() || moving.len() > MAX_AXES {
+        if moving.is_empty() || moving.len() > MAX_JOINTS {
             let message = match moving.len() {
                 0 => format!("no joint moves link {tip:?}: name a tip farther out"),
                 count => format!(
-                    "the chain to {tip:?} has {count} moving joints, {}: a scene with a grid takes {MAX_AXES}; hold \
-                     some with --lock JOINT=VALUE",
+                    "the chain to {tip:?} has {count} moving joints, {}: a scene takes {MAX_JOINTS}; hold some with \
+                     --lock JOINT=VALUE",
                     moving.join(", ")
                 ),
             };

@@ -24,6 +24,12 @@ const DENSITY: f64 = 0.7;
 /// Least spacing (m): ten times the digits with which a scene shows its nodes.
 const LEAST_SPACING: f64 = 1e-4;
 
+/// Spacing where none is given and it does not make too many nodes (m).
+const USUAL_SPACING: f64 = 5e-3;
+
+/// How much wider a spacing is than the one that makes as many nodes as a scene takes (1): the density is an estimate.
+const MARGIN: f64 = 1.05;
+
 /// Seed of the random candidates.
 const SEED: u64 = 1;
 
@@ -36,14 +42,14 @@ pub struct ContactNodes {
     pub of_joints: Vec<Vec<DVec3>>,
 }
 
-/// Puts contact nodes on the shapes of `arm` at a `spacing` (m). `packages`: folder in which ROS packages are looked
-/// for.
+/// Puts contact nodes on the shapes of `arm` at a `spacing` (m); where none is given, 5 mm apart, or as far as there may
+/// not be more of them. `packages`: folder in which ROS packages are looked for.
 ///
 /// # Errors
 /// If a mesh cannot be read, or there are no nodes or more than a scene takes.
-pub fn sample(robot: &Robot, arm: &Arm, spacing: f64, packages: Option<&Path>) -> Result<ContactNodes, Error> {
+pub fn sample(robot: &Robot, arm: &Arm, spacing: Option<f64>, packages: Option<&Path>) -> Result<ContactNodes, Error> {
     let refuse = |message: String| Error::at(&robot.path, message);
-    if !(spacing >= LEAST_SPACING && spacing.is_finite()) {
+    if let Some(spacing) = spacing.filter(|spacing| !(*spacing >= LEAST_SPACING && spacing.is_finite())) {
         return Err(refuse(format!("the spacing is {spacing} m: it must be at least {LEAST_SPACING} m")));
     }
     let source = robot.source();
@@ -54,31 +60,37 @@ pub fn sample(robot: &Robot, arm: &Arm, spacing: f64, packages: Option<&Path>) -
         surfaces.push(of_joint?);
     }
     let area: f64 = surfaces.iter().flatten().flat_map(Surface::areas).sum();
-    let too_many = |count: f64| {
-        // In tenths of a millimetre, a little wider than would do.
-        let wider = (1.05e4 * spacing * (count / MAX_CONTACT_NODES as f64).sqrt()).ceil() / 1e4;
-        let shapes = arm.joints.iter().flat_map(|joint| &joint.shapes);
-        let oversize = shapes.zip(surfaces.iter().flatten()).find_map(|(shape, surface)| surface.oversize(shape));
-        let remedy = oversize.unwrap_or_else(|| format!("give --spacing {wider} or more"));
-        refuse(format!(
-            "a spacing of {spacing} m makes {count:.0} contact nodes, and a scene takes {MAX_CONTACT_NODES}: {remedy}"
-        ))
-    };
-    // Twice as many are refused before anything is sampled.
-    let expected = DENSITY * area / (spacing * spacing);
-    let countable = expected <= 2.0 * MAX_CONTACT_NODES as f64;
-    if !countable {
-        return Err(too_many(expected));
-    }
-    let of_joints: Vec<Vec<DVec3>> = surfaces.iter().map(|surfaces| discs(surfaces, spacing)).collect();
-    match of_joints.iter().map(Vec::len).sum() {
-        0 => Err(refuse(
-            "no moving link has a shape to put contact nodes on: add <collision> to the links that touch".into(),
-        )),
-        count if count > MAX_CONTACT_NODES => Err(too_many(count as f64)),
-        _ => Ok(ContactNodes { spacing, of_joints }),
+    let shapes = arm.joints.iter().flat_map(|joint| &joint.shapes);
+    let oversize = shapes.zip(surfaces.iter().flatten()).find_map(|(shape, surface)| surface.oversize(shape));
+    let mut trial = spacing.unwrap_or(USUAL_SPACING);
+    loop {
+        // Twice as many as a scene takes are refused before anything is sampled.
+        let expected = DENSITY * area / (trial * trial);
+        let of_joints: Vec<Vec<DVec3>> = if expected <= 2.0 * MAX_CONTACT_NODES as f64 {
+            surfaces.iter().map(|surfaces| discs(surfaces, trial)).collect()
+        } else {
+            Vec::new()
+        };
+        let count = match of_joints.iter().map(Vec::len).sum::<usize>() {
+            0 if expected == 0.0 => return Err(refuse(NO_SHAPE.into())),
+            0 => expected,
+            count if count <= MAX_CONTACT_NODES => return Ok(ContactNodes { spacing: trial, of_joints }),
+            count => count as f64,
+        };
+        // In tenths of a millimetre.
+        let wider = (1e4 * MARGIN * trial * (count / MAX_CONTACT_NODES as f64).sqrt()).ceil() / 1e4;
+        if spacing.is_some() || oversize.is_some() || !wider.is_finite() {
+            let remedy = oversize.unwrap_or_else(|| format!("give --spacing {wider} or more"));
+            return Err(refuse(format!(
+                "a spacing of {trial} m makes {count:.0} contact nodes, and a scene takes {MAX_CONTACT_NODES}: {remedy}"
+            )));
+        }
+        trial = wider;
     }
 }
+
+/// An arm that cannot touch.
+const NO_SHAPE: &str = "no moving link has a shape to put contact nodes on: add <collision> to the links that touch";
 
 /// Points on the surfaces of one link.
 fn discs(surfaces: &[Surface], spacing: f64) -> Vec<DVec3> {

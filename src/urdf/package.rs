@@ -1,10 +1,15 @@
 //! Where a robot file's meshes are.
 //!
 //! A plain path is relative to the robot file. `package://name/path` is a path in the ROS package `name`: a folder of
-//! that name that holds the robot file or lies beside one that does, or is in the folder that the user names. No
-//! program is asked for it.
+//! that name, or whose package.xml has it, that holds the robot file or lies beside one that does, or is in the folder
+//! that the user names. No program is asked for it.
 
-use std::path::{Path, PathBuf};
+use roxmltree::Document;
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
 
 /// Returns the file that `name` means in the robot file `robot`.
 ///
@@ -20,7 +25,7 @@ pub(super) fn resolve(name: &str, robot: &Path, packages: Option<&Path>) -> Resu
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let of_user = packages.into_iter().flat_map(|own| [own.join(package), own.to_owned()]);
         let above = folder.ancestors().flat_map(|above| {
-            let itself = above.ends_with(package).then(|| above.to_owned());
+            let itself = (above.ends_with(package) || is_called(above, package)).then(|| above.to_owned());
             itself.into_iter().chain([above.join(package)])
         });
         return of_user.chain(above).map(|place| place.join(inside)).find(|file| file.is_file()).ok_or_else(|| {
@@ -36,4 +41,18 @@ pub(super) fn resolve(name: &str, robot: &Path, packages: Option<&Path>) -> Resu
     }
     let file = folder.join(path);
     if file.is_file() { Ok(file) } else { Err(format!("there is no file {}: correct the path", file.display())) }
+}
+
+/// Longest package.xml that is read (bytes).
+const LONGEST: u64 = 1 << 16;
+
+/// Whether the package.xml in `folder`, if there is one, names the package `package`.
+fn is_called(folder: &Path, package: &str) -> bool {
+    let mut text = String::new();
+    let read = File::open(folder.join("package.xml")).and_then(|file| file.take(LONGEST).read_to_string(&mut text));
+    let document = read.ok().and_then(|_| Document::parse(&text).ok());
+    let name = document.as_ref().and_then(|document| {
+        document.root_element().children().find(|child| child.has_tag_name("name")).and_then(|name| name.text())
+    });
+    name.is_some_and(|name| name.trim() == package)
 }

@@ -2,10 +2,10 @@
 
 use super::{Arm, ArmJoint, ContactNodes, Robot};
 use super::{practice::Practice, shape};
-use crate::Error;
 use crate::proxy::{Chain, Press};
 use crate::scene::{JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
 use crate::toml_text::{coarse, comment, entry, heading, list, number, significant, vector};
+use crate::{Error, MAX_AXES};
 use glam::DVec3;
 use std::fmt::Write;
 
@@ -110,13 +110,15 @@ fn write(
     entry(text, "stiffness", "200.0", "N/m, of one contact spring; each node has three")?;
 
     let Practice { press, .. } = practice;
-    heading(text, "C-space: where contact is baked")?;
-    writeln!(
-        text,
-        "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with \
-         --max-error.\n"
-    )?;
-    press.write_grid(text, &proxy.joints)?;
+    if proxy.joints.len() <= MAX_AXES {
+        heading(text, "C-space: where contact is baked")?;
+        writeln!(
+            text,
+            "# Coarse, for a first look: narrow the ranges to those that you use, and raise the counts, or bake with \
+             --max-error.\n"
+        )?;
+        press.write_grid(text, &proxy.joints)?;
+    }
 
     heading(text, "The 1 kHz loop")?;
     write_haptics(text, arm, proxy, press)?;
@@ -214,7 +216,7 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, press: &Press)
     let stiffness: Vec<f64> = press.levers.iter().map(|lever| TIP_STIFFNESS * lever * lever).collect();
     let scaled = |factor: f64| list(&stiffness, |k| coarse(factor * k));
     entry(text, "boundary_slope", &scaled(0.75), "N m/rad or N/m")?;
-    entry(text, "proxy_damping", &scaled(2.5e-3), "N m s/rad or N s/m")?;
+    writeln!(text, "# proxy_damping is left out: as much as the torque needs to be passive.")?;
     entry(text, "coupling_stiffness", &scaled(1.0), "N m/rad or N/m")?;
     entry(text, "coupling_damping", &scaled(5e-4), "N m s/rad or N s/m")?;
     entry(text, "device_damping", &scaled(1.5e-3), "N m s/rad or N s/m")?;

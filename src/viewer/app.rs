@@ -7,6 +7,7 @@ use super::{
     files::Files,
     job::{Job, JobResult, Solver, Task},
     lead::DeviceChoice,
+    notice::Notice,
     plots::Plots,
     scene::SceneView,
     session::Session,
@@ -63,6 +64,8 @@ pub struct Viewer {
     /// Backends of this machine, and the chosen one.
     pub(super) solvers: Vec<Solver>,
     pub(super) solver: Solver,
+    /// What was done last, until it has faded.
+    pub(super) notice: Option<Notice>,
     /// The last error, until it is dismissed.
     pub(super) error: Option<String>,
     /// Frames of the window a second, over the last ones, where it goes by the clock.
@@ -116,6 +119,7 @@ impl Viewer {
             job: None,
             solvers: Solver::all(),
             solver: Solver::Auto,
+            notice: None,
             error: None,
             frame_rate: None,
             shows_steps: pace == TickSource::Clock,
@@ -271,10 +275,10 @@ impl Viewer {
         Some(self.session.as_ref()?.history.last()?.sample.torque.norm())
     }
 
-    /// Returns where the proxy's last node is shown, when the 3-D scene fills `rect`.
+    /// Returns where the tip of the arm is shown, when the 3-D scene fills `rect`.
     #[must_use]
     pub fn tip_in(&self, rect: egui::Rect) -> Option<egui::Pos2> {
-        self.scene.tip_in(rect)
+        self.scene.shown_at(self.scene.tip(&self.session.as_ref()?.loaded.setup.chain)?, rect)
     }
 
     /// Whether nothing moves and nothing is made, so that another frame would look the same.
@@ -308,6 +312,7 @@ impl Viewer {
         self.error = redrawn.and_then(|()| session.follow(wake())).err().or(self.error.take());
         session.feel.step((elapsed / session.loaded.setup.haptics.period()).round() as usize);
         session.history.collect(&mut session.feel);
+        session.go_on_without_a_device();
         let latest = session.feel.latest();
         let axes = session.loaded.dataset.grid.axes.iter();
         let moved = |now: &[f64], before: &[f64]| {

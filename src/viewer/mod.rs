@@ -10,10 +10,11 @@
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
 //! | `lead` | a haptic device that leads in the place of all these |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
+//! | `readout`, `probe` | numbers over that picture, the vertex that was clicked |
 //! | `steering`, `node_drag` | whence it is seen, and the pointer's grip on the proxy |
 //! | `view_renderer`, `pipelines`, `shapes`, `links`, `pixels` | the renderer of that panel |
 //! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
-//! | `legend`, `steps` | a sample and its name, the first screen |
+//! | `legend`, `notice`, `steps` | a sample and its name, a message that fades, the first screen |
 //!
 //! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
 //! haptic thread waits for nothing here; see `feel`.
@@ -36,6 +37,7 @@ mod legend;
 mod links;
 mod loaded;
 mod node_drag;
+mod notice;
 mod offscreen;
 mod overlay;
 mod palette;
@@ -43,6 +45,8 @@ mod panels;
 mod pipelines;
 mod pixels;
 mod plots;
+mod probe;
+mod readout;
 mod scene;
 mod session;
 mod shapes;
@@ -145,6 +149,12 @@ fn aspect(rect: Rect) -> f64 {
 /// Where a point of the picture in `rect` is, x right and y up from -1 to 1.
 fn on_screen(rect: Rect, at: DVec2) -> Pos2 {
     rect.center() + 0.5 * vec2(at.x as f32 * rect.width(), -at.y as f32 * rect.height())
+}
+
+/// Which point of the picture in `rect` is at `place`, x right and y up from -1 to 1.
+fn in_picture(rect: Rect, place: Pos2) -> DVec2 {
+    let from_centre = place - rect.center();
+    DVec2::new((2.0 * from_centre.x / rect.width()).into(), (-2.0 * from_centre.y / rect.height()).into())
 }
 
 /// A number with three digits, as labels show it.

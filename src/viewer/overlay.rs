@@ -2,10 +2,10 @@
 
 use super::{
     body::Body,
-    number,
+    legend, number,
     palette::Palette,
     slices::gradient,
-    theme::{self, AXIS_LINE, COLOUR_BAR, FINE_GAP, GAP, GROUP_GAP, TICK},
+    theme::{self, AXIS_LINE, COLOUR_BAR, CROSS, CURVE, FINE_GAP, GAP, SAMPLE, TICK},
     trimmed,
     view_renderer::Quantity,
 };
@@ -27,27 +27,32 @@ const BAR_WIDTH: [f32; 2] = [60.0, 136.0];
 /// Left of the bar: axes, a short scale.
 const LEFT_OF_BAR: f32 = 132.0;
 
-/// Draws it over the picture in `rect`, seen by `camera`. `arrows`: whether those of the forces are shown.
-pub fn show(
-    ui: &Ui,
-    rect: Rect,
-    palette: &Palette,
-    camera: &Camera,
-    body: Option<&Body>,
-    quantity: Quantity,
-    arrows: bool,
-) {
+/// Draws it over the picture in `rect`, seen by `camera`.
+pub fn show(ui: &Ui, rect: Rect, palette: &Palette, camera: &Camera, body: Option<&Body>, quantity: Quantity) {
     let painter = ui.painter_at(rect);
     axes(ui, &painter, rect, palette, camera);
     scale(ui, &painter, rect, palette, camera);
     if let Some(body) = body {
         colours(ui, &painter, rect, body, quantity);
-        let most = body.contacts().map(|(_, force)| force.length()).fold(0.0, f64::max);
-        if most > 0.0 && arrows {
-            let note = format!("arrows: forces on the proxy, longest {} N", number(most));
-            let place = rect.left_top() + vec2(GROUP_GAP, GROUP_GAP);
-            painter.text(place, Align2::LEFT_TOP, note, theme::small(), ui.visuals().text_color());
+    }
+}
+
+/// Names the colours that there are besides that of the surface. `arrows`, `ghost`: whether these are shown.
+pub fn keys(ui: &mut Ui, palette: &Palette, body: Option<&Body>, arrows: bool, ghost: bool) {
+    let forces = body.into_iter().flat_map(Body::contacts).map(|(_, force)| force.length());
+    if let Some(most) = forces.reduce(f64::max) {
+        let sample = legend::entry(ui, SAMPLE, "vertex in contact").center();
+        ui.painter().circle_filled(sample, CROSS, palette.force);
+        if arrows {
+            let sample = legend::entry(ui, SAMPLE, &format!("force on the arm, longest {} N", number(most)));
+            let along = vec2(sample.width(), 0.0);
+            ui.painter().arrow(sample.left_center(), along, Stroke::new(CURVE, palette.force));
         }
+    }
+    if ghost {
+        let sample = legend::entry(ui, SAMPLE, "ghost: the device");
+        let ends = [sample.left_center(), sample.right_center()];
+        ui.painter().line_segment(ends, Stroke::new(CURVE, palette.ghost));
     }
 }
 

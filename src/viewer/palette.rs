@@ -20,6 +20,8 @@ pub struct Palette {
     pub force: Color32,
     /// Where the device is.
     pub ghost: Color32,
+    /// Shadow on the ground of the scene.
+    pub shadow: Color32,
     /// Axes of the scene and scale bar.
     pub axis: Color32,
     /// The current configuration in C-space.
@@ -74,6 +76,7 @@ pub fn of(visuals: &Visuals) -> Palette {
         node: hex(0x2b_34_40, 0xd5_dc_e6),
         force: hex(0xd5_5e_00, 0xf0_8a_3c),
         ghost: hex(0x00_72_b2, 0x56_b4_e9),
+        shadow: hex(0xdf_e3_e8, 0x0d_10_14),
         axis: hex(0x6b_75_82, 0x8a_94_a3),
         here: hex(0x22_2b_36, 0xff_ff_ff),
         flagged: hex(0xd0_1c_55, 0xf6_5a_83),

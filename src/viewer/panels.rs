@@ -7,12 +7,13 @@ use super::{
     job::{Job, Task, short},
     lead::Lead,
     loaded::Loaded,
+    notice::Notice,
     number,
     plots::{self, Plots},
     session::Session,
     steering, steps,
     theme::{
-        self, BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LEAST_MOTION, LONE_BUTTON, MESSAGE_WIDTH,
+        BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LEAST_MOTION, LONE_BUTTON, MESSAGE_WIDTH,
         MOTION_WIDTH, NAME_SHARE, NARROW, PANEL_MARGIN, PAUSE_WIDTH, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT,
         SIDE_SHARE, SPACE_RANGE, TIME_WIDTH, WIDE_PROGRESS,
     },
@@ -23,7 +24,7 @@ use crate::{
 };
 use eframe::egui::{
     self, Align, Button, CentralPanel, Color32, Frame, Grid, Label, Layout, Panel, ProgressBar, RichText, ScrollArea,
-    Slider, TextStyle, TextWrapMode, Ui, vec2,
+    Slider, TextStyle, Ui, vec2,
 };
 use std::path::Path;
 
@@ -35,7 +36,7 @@ impl Viewer {
             self.open_file(&path, &ui.ctx().clone());
         }
         Panel::top("bar").frame(bar(ui)).show(ui, |ui| self.bar(ui));
-        Panel::bottom("status").frame(bar(ui)).show(ui, |ui| self.status(ui));
+        let status = Panel::bottom("status").frame(bar(ui)).show(ui, |ui| self.status(ui)).response.rect.height();
         if self.session.is_some() {
             self.panels(ui);
         } else {
@@ -44,6 +45,7 @@ impl Viewer {
         if let Some(path) = self.files.show(ui) {
             self.open_file(&path, &ui.ctx().clone());
         }
+        self.notice.take_if(|notice| !notice.show(ui.ctx(), status));
         self.complaint(ui);
     }
 
@@ -92,25 +94,21 @@ impl Viewer {
         }
     }
 
-    /// Shows which adapter draws, and how the loop is doing. In a narrow window what stands last is cut off, and
-    /// nothing lies on anything else; a fault stands first.
+    /// Shows how the loop is doing, and which adapter draws, in as many lines as that takes; a fault stands first.
     fn status(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        ui.horizontal_wrapped(|ui| {
+            if let Some(session) = &mut self.session {
+                // A dataset knows them at its points, a scene that is solved live where the arm is.
+                let touched = match session.history.last() {
+                    Some(tick) if session.loaded.knows_nodes() => Some(tick.sample.contact_nodes as usize),
+                    _ => self.scene.touched().map(|(vertices, _)| vertices),
+                };
+                faults(ui, session);
+                felt(ui, session, touched);
                 self.progress_or_punctuality(ui);
-                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                    ui.style_mut().wrap_mode = Some(TextWrapMode::Truncate);
-                    // What finds no room ends before the words on the right.
-                    ui.set_clip_rect(ui.max_rect().intersect(ui.clip_rect()));
-                    if let Some(session) = &mut self.session {
-                        faults(ui, session);
-                    }
-                    self.drawn_by(ui);
-                    if let Some(session) = &mut self.session {
-                        felt(ui, session);
-                    }
-                });
-            });
+                ui.separator();
+            }
+            self.drawn_by(ui);
         });
     }
 
@@ -129,8 +127,9 @@ impl Viewer {
     fn progress_or_punctuality(&self, ui: &mut Ui) {
         let Some(session) = &self.session else { return };
         if let Some(job) = &self.job {
-            progress(ui, job, PROGRESS);
+            ui.separator();
             ui.label(RichText::new(&job.title).small());
+            progress(ui, job, PROGRESS);
             return;
         }
         let coming = [
@@ -138,6 +137,7 @@ impl Viewer {
             (self.scene.is_redrawing(), "The object is set up again …"),
         ];
         if let Some((_, what)) = coming.into_iter().find(|(is_coming, _)| *is_coming) {
+            ui.separator();
             ui.spinner();
             ui.label(RichText::new(what).small());
             return;
@@ -147,6 +147,7 @@ impl Viewer {
         if cost.count > 0 && self.pace == TickSource::Clock {
             let words = format!("tick {} µs, jitter {} µs at 99 %", number(cost.p50), number(jitter.p99));
             let refused = session.history.refused();
+            ui.separator();
             let label = ui.label(RichText::new(words).small());
             if !refused.is_empty() {
                 label.on_hover_text(refused.join("\n"));
@@ -163,8 +164,9 @@ impl Viewer {
         let below = share(size.y, PLOTS_RANGE);
         // In a narrow window the plots get its whole width, in a wide one C-space gets its whole height.
         let narrow = size.x < NARROW;
+        let mut written = None;
         if narrow {
-            plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+            written = plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
         }
         Panel::left("controls")
             .frame(side)
@@ -183,18 +185,23 @@ impl Viewer {
             session.configuration_space(ui, &q);
         });
         if !narrow {
-            plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+            written = plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
         }
         let shows_steps = &mut self.shows_steps;
         CentralPanel::no_frame().show(ui, |ui| {
             if *shows_steps {
                 *shows_steps = steps::show(ui, &session.loaded);
             }
-            if let Err(error) = self.scene.show(ui, &session.loaded, &session.feel) {
+            if let Err(error) = self.scene.show(ui, &session.loaded, &session.feel, session.history.last()) {
                 self.error = Some(not_drawn(error));
             }
         });
         self.solver = session.controls.solver.clone();
+        match written {
+            Some(Ok(text)) => self.notice = Some(Notice::new(text)),
+            Some(Err(error)) => self.error = Some(error),
+            None => {}
+        }
         if let (true, Some(scene)) = (bake, session.controls.scene.clone()) {
             let surface = session.loaded.dataset.surface.clone();
             self.begin(Task::Bake(scene, surface), &ui.ctx().clone());
@@ -256,7 +263,10 @@ impl Viewer {
         let Some(session) = &self.session else { return };
         let file = self.files.fresh(&session.loaded.name, "haptize");
         match session.loaded.dataset.save(&file) {
-            Ok(()) => self.files.remember(&file),
+            Ok(()) => {
+                self.notice = Some(Notice::new(format!("wrote {}", file.display())));
+                self.files.remember(&file);
+            }
             Err(error) => self.error = Some(error.to_string()),
         }
     }
@@ -285,12 +295,21 @@ fn help(ui: &mut Ui) {
     });
 }
 
-fn plots_panel(ui: &mut Ui, frame: Frame, height: f32, plots: &mut Plots, session: &mut Session, folder: &Path) {
-    Panel::bottom("plots").frame(frame).resizable(true).default_size(height).show(ui, |ui| {
-        if plots.show(ui, &session.loaded, &mut session.history, folder) {
-            session.history.hold_still(&mut session.feel);
-        }
-    });
+/// Shows the plots, and returns where files were written, if they were, or why not.
+fn plots_panel(
+    ui: &mut Ui,
+    frame: Frame,
+    height: f32,
+    plots: &mut Plots,
+    session: &mut Session,
+    folder: &Path,
+) -> Option<Result<String, String>> {
+    let panel = Panel::bottom("plots").frame(frame).resizable(true).default_size(height);
+    let asked = panel.show(ui, |ui| plots.show(ui, &session.loaded, &mut session.history, folder)).inner;
+    if asked.hold_still {
+        session.history.hold_still(&mut session.feel);
+    }
+    asked.written
 }
 
 /// Says which device leads, and presses its dead-man key while the space bar is held.
@@ -382,11 +401,11 @@ fn faults(ui: &mut Ui, session: &mut Session) {
     }
 }
 
-/// What is touched, how hard, and how much of it is solved.
-fn felt(ui: &mut Ui, session: &mut Session) {
+/// What is touched, how much of its dent stays, and how it is solved. `touched`: vertices in contact, where they are
+/// known.
+fn felt(ui: &mut Ui, session: &mut Session, touched: Option<usize>) {
     let Some(tick) = session.history.last() else { return };
-    ui.separator();
-    let mut contact = contact(tick, session.loaded.knows_nodes());
+    let mut contact = contact(tick, touched);
     let held = tick.flags.contains(Flags::HELD);
     let colour = if held { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
     if held {
@@ -394,13 +413,6 @@ fn felt(ui: &mut Ui, session: &mut Session) {
         contact += &format!(", Kvc {}", border_stiffness(gains, &session.loaded.dataset.grid));
     }
     ui.colored_label(colour, RichText::new(contact).small());
-    ui.separator();
-    let units = session.loaded.dataset.grid.axes.iter().map(|axis| axis.effort_unit().to_owned());
-    let sizes = theme::by_unit(units).into_iter().map(|(unit, joints)| {
-        let size = joints.iter().map(|&joint| tick.sample.torque[joint].powi(2)).sum::<f64>().sqrt();
-        format!("{} {} {unit}", if unit == "N" { "force" } else { "torque" }, number(size))
-    });
-    ui.label(RichText::new(sizes.collect::<Vec<_>>().join(", ")).small());
     if let Some(dent) = tick.dent {
         ui.separator();
         ui.label(RichText::new(format!("dent {:.0} %", 100.0 * dent)).small())
@@ -417,13 +429,14 @@ fn bar(ui: &Ui) -> Frame {
     Frame::new().fill(ui.visuals().panel_fill).inner_margin(BAR_MARGIN)
 }
 
-/// Returns the state of contact in words. `known`: whether the dataset holds the nodes in contact.
-fn contact(tick: &Tick, known: bool) -> String {
-    match tick.sample.contact {
+/// Returns the state of contact in words. `touched`: vertices in contact, where they are known.
+fn contact(tick: &Tick, touched: Option<usize>) -> String {
+    match (tick.sample.contact, touched) {
         _ if tick.flags.contains(Flags::HELD) => "held at the border of the haptized range".into(),
-        false if tick.flags.contains(Flags::OUTSIDE) => "free, outside the haptized range".into(),
-        false => "free".into(),
-        true if known => format!("{} nodes in contact", tick.sample.contact_nodes),
-        true => "in contact, nodes not stored".into(),
+        (false, _) if tick.flags.contains(Flags::OUTSIDE) => "free, outside the haptized range".into(),
+        (false, _) => "free".into(),
+        (true, Some(1)) => "1 vertex in contact".into(),
+        (true, Some(touched)) => format!("{touched} vertices in contact"),
+        (true, None) => "in contact, vertices not known".into(),
     }
 }

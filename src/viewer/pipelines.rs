@@ -28,6 +28,7 @@ pub struct View {
     pub triangles: u32,
     pub quantity: u32,
     pub padding: [u32; 3],
+    pub shade: [f32; 4],
 }
 
 /// The pipeline of the surface; its buffers are rest positions, state, forces, mesh.

@@ -47,8 +47,15 @@ pub struct Plots {
     frozen: Option<History>,
     /// Length of the time axis (s).
     seconds: f64,
-    /// Where files were written, or why not.
-    note: Option<Result<String, String>>,
+}
+
+/// What the panel asks of the window.
+#[derive(Default)]
+pub struct Asked {
+    /// To hold still.
+    pub hold_still: bool,
+    /// To say where files were written, or why not.
+    pub written: Option<Result<String, String>>,
 }
 
 /// Lengths of the time axis that can be chosen (s): a touch, a motion of the scene, all that is kept.
@@ -78,7 +85,7 @@ const POINTS: usize = 700;
 
 impl Default for Plots {
     fn default() -> Self {
-        Self { tab: Tab::Torque, frozen: None, seconds: SPANS[1], note: None }
+        Self { tab: Tab::Torque, frozen: None, seconds: SPANS[1] }
     }
 }
 
@@ -88,9 +95,9 @@ impl Plots {
         self.frozen = None;
     }
 
-    /// The panel in all of `ui`; `folder` is where files go. Answers whether the window is to hold still.
-    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, folder: &Path) -> bool {
-        let mut hold_still = false;
+    /// The panel in all of `ui`; `folder` is where files go.
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, folder: &Path) -> Asked {
+        let mut asked = Asked::default();
         ui.horizontal_wrapped(|ui| {
             for (tab, name, what) in [
                 (Tab::Torque, "Torque", "Contact torque on the proxy, and torque on the device"),
@@ -111,10 +118,10 @@ impl Plots {
                 self.span(ui);
             }
             if ui.button("CSV").on_hover_text("Export all ticks kept, the last twenty seconds").clicked() {
-                self.note = Some(self.write_csv(loaded, history, folder));
+                asked.written = Some(self.write_csv(loaded, history, folder));
             }
             if ui.button("PNG").on_hover_text("Export the figures that haptize play draws").clicked() {
-                self.note = Some(self.write_png(loaded, history, folder).map_err(|error| error.to_string()));
+                asked.written = Some(self.write_png(loaded, history, folder).map_err(|error| error.to_string()));
             }
             if self.tab == Tab::Timing {
                 if ui.button("Reset").clicked() {
@@ -123,12 +130,7 @@ impl Plots {
                 let why = "The window holds still for two seconds while the loop goes on: the jitter that is left is \
                            the machine's own, what is more is the window's";
                 let clocked = history.cost().percentiles().count > 0;
-                hold_still = ui.add_enabled(clocked, Button::new("Hold still")).on_hover_text(why).clicked();
-            }
-            match &self.note {
-                Some(Ok(note)) => drop(ui.label(RichText::new(note).weak())),
-                Some(Err(note)) => drop(ui.colored_label(ui.visuals().error_fg_color, note)),
-                None => {}
+                asked.hold_still = ui.add_enabled(clocked, Button::new("Hold still")).on_hover_text(why).clicked();
             }
         });
         let shown = self.frozen.as_ref().unwrap_or(history);
@@ -139,7 +141,7 @@ impl Plots {
             Tab::Energy => self.energy(ui, loaded, shown),
             Tab::Timing => timing(ui, shown),
         }
-        hold_still
+        asked
     }
 
     /// Lets the user choose how long the time axis is.

@@ -5,12 +5,16 @@ use super::{
     background::Following,
     body::Body,
     feel::Feel,
+    in_picture,
     links::Links,
     loaded::Loaded,
     on_screen, overlay,
     palette::{self, Palette, figure_colour},
+    probe::pick,
+    readout::Readout,
     shapes::Shape,
     steering::Steering,
+    theme::{FINE_GAP, GROUP_GAP},
     view_renderer::{Look, Quantity, ViewRenderer},
 };
 use crate::{
@@ -20,12 +24,12 @@ use crate::{
         solid::{self, Cone},
     },
     gpu::Context,
-    proxy::{Chain, Pose},
-    render::session::Latest,
+    proxy::{Chain, Pose, tip},
+    render::{session::Latest, trace::Tick},
     scene::GraphicsEffects,
 };
 use eframe::{
-    egui::{self, Color32, Rect, Sense, Ui, pos2},
+    egui::{self, Color32, Rect, Sense, Ui, UiBuilder, pos2},
     egui_wgpu::RenderState,
 };
 use glam::DVec3;
@@ -58,21 +62,29 @@ pub struct SceneView {
     redrawing: Following<GraphicsEffects, Result<Option<Body>, Error>>,
     pose: Pose,
     ghost: Pose,
+    /// The vertex that was clicked.
+    probed: Option<usize>,
     /// The parts that are shown.
     pub shown: Shown,
     /// Extent of the scene (m).
     extent: f64,
+    /// Height of the lowest point of the object at rest, or else of the arm (m).
+    ground: f64,
 }
 
 // Sizes of the proxy: a link's radius over the extent of the scene; all others over that radius [1].
 const LINK: f64 = 0.012;
 const CONTACT_BALL: f64 = 1.3;
 const HELD_BALL: f64 = 2.0;
+const PROBED_BALL: f64 = 1.5;
 const GHOST: f64 = 0.45;
 const ARROW: f64 = 0.55;
 
 /// Length of the arrow of the dataset's greatest force over the extent of the scene (1).
 const LONGEST_ARROW: f64 = 0.5;
+
+/// How far the ground is below the object over the extent of the scene (1).
+const GROUND: f64 = 2e-3;
 
 /// Radius of what is seen at first over the extent of the scene (1): a little less than all, whose corners are empty.
 const SEEN: f64 = 0.98;
@@ -98,7 +110,9 @@ impl SceneView {
             pose: Pose::default(),
             ghost: Pose::default(),
             shown: Shown { edges: true, forces: true, ghost: true, quantity: Quantity::Displacement },
+            probed: None,
             extent: NO_EXTENT,
+            ground: 0.0,
         })
     }
 
@@ -120,6 +134,10 @@ impl SceneView {
         let least = points.iter().copied().reduce(DVec3::min).unwrap_or(DVec3::ZERO);
         let greatest = points.iter().copied().reduce(DVec3::max).unwrap_or(DVec3::ZERO);
         self.extent = 0.5 * least.distance(greatest);
+        let body = loaded.setup.object.iter().flat_map(|object| &object.rest).map(|place| place.z).reduce(f64::min);
+        // Below what stands on it, so that depths tell the two apart.
+        self.ground = body.unwrap_or(least.z) - GROUND * self.extent;
+        self.probed = None;
         self.steering = Steering::new(Camera::looking_at(0.5 * (least + greatest), SEEN * self.extent));
     }
 
@@ -174,18 +192,30 @@ impl SceneView {
         Ok(())
     }
 
-    /// Returns where the proxy's last node is shown in `rect`.
+    /// Returns where `place` (m) is shown in `rect`.
     #[must_use]
-    pub fn tip_in(&self, rect: Rect) -> Option<egui::Pos2> {
-        let tip = *self.pose.nodes.last()?;
-        Some(on_screen(rect, self.steering.camera.project(tip, aspect(rect))?.at))
+    pub fn shown_at(&self, place: DVec3, rect: Rect) -> Option<egui::Pos2> {
+        Some(on_screen(rect, self.steering.camera.project(place, aspect(rect))?.at))
     }
 
-    /// Shows the scene in all of `ui`, and lets pointer and keys lead the hand of `feel`.
+    /// Where the tip of the arm is (m).
+    #[must_use]
+    pub fn tip(&self, chain: &Chain) -> Option<DVec3> {
+        tip(chain).map(|node| self.pose.nodes[node])
+    }
+
+    /// Vertices in contact, and the sum of the forces of the object on the arm (N); none where they are not known.
+    #[must_use]
+    pub fn touched(&self) -> Option<(usize, DVec3)> {
+        let body = self.body.as_ref()?;
+        Some(body.contacts().fold((0, DVec3::ZERO), |(count, sum), (_, force)| (count + 1, sum - force)))
+    }
+
+    /// Shows the scene in all of `ui`, with the numbers of `tick`, and lets pointer and keys lead the hand of `feel`.
     ///
     /// # Errors
     /// When the device fails.
-    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, feel: &Feel) -> Result<(), ViewError> {
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, feel: &Feel, tick: Option<&Tick>) -> Result<(), ViewError> {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
         // Not longer than that: the hand's thread waits for its guide, and to draw takes long.
@@ -193,12 +223,35 @@ impl SceneView {
         guide.shown_in(ui.ctx());
         self.steering.steer(ui, &response, rect, &loaded.setup.chain, &self.pose, &mut guide);
         drop(guide);
+        if response.clicked()
+            && let (Some(pointer), Some(body), Some(object)) =
+                (response.interact_pointer_pos(), &self.body, &loaded.setup.object)
+        {
+            let ray = self.steering.camera.ray(in_picture(rect, pointer), aspect(rect));
+            self.probed = pick(&ray, &body.places()?, &object.triangles);
+        }
         let palette = palette::of(ui.visuals());
         let texture = self.draw(rect, ui.ctx().pixels_per_point(), &palette, &loaded.setup.chain)?;
         let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         ui.painter().image(texture, rect, whole, Color32::WHITE);
         let Shown { quantity, forces, .. } = self.shown;
-        overlay::show(ui, rect, &palette, &self.steering.camera, self.body.as_ref(), quantity, forces);
+        overlay::show(ui, rect, &palette, &self.steering.camera, self.body.as_ref(), quantity);
+        let probe = match (self.probed, &self.body) {
+            (Some(vertex), Some(body)) => body.probe(vertex)?,
+            _ => None,
+        };
+        let builder = UiBuilder::new().max_rect(rect.shrink(GROUP_GAP));
+        ui.scope_builder(builder, |ui| {
+            ui.spacing_mut().item_spacing.y = FINE_GAP;
+            // The picture under them is dragged and clicked.
+            ui.style_mut().interaction.selectable_labels = false;
+            if let Some(tick) = tick {
+                let (axes, chain) = (&loaded.dataset.grid.axes, &loaded.setup.chain);
+                let force = self.touched().map(|(_, force)| force);
+                Readout { axes, tick, tip: self.tip(chain), force, probe }.show(ui);
+            }
+            overlay::keys(ui, &palette, self.body.as_ref(), forces, self.shows_ghost());
+        });
         Ok(())
     }
 
@@ -225,11 +278,13 @@ impl SceneView {
             quantity: self.shown.quantity,
             colour_top: top as f32,
             edge_width: if self.shown.edges { pixels_per_point } else { 0.0 },
+            ground: (self.ground as f32, figure_colour(palette.shadow).channels()),
         };
-        let shapes = self.shapes(palette, chain);
+        let (shapes, casting) = self.shapes(palette, chain);
         let surface = self.body.as_ref().map(|body| &body.surface);
         let links = self.links.as_ref().map(|links| links.at(&self.pose, figure_colour(palette.link)));
-        let picture = self.stage.draw(size, &self.steering.camera, &look, surface, links.as_ref(), &shapes)?;
+        let picture =
+            self.stage.draw(size, &self.steering.camera, &look, surface, links.as_ref(), (&shapes, casting))?;
         let actual = [picture.width() as usize, picture.height() as usize];
         let texture = match self.texture {
             Some((id, known)) if known == actual => id,
@@ -251,8 +306,13 @@ impl SceneView {
         Ok(texture)
     }
 
-    /// Everything that is drawn besides the surface.
-    fn shapes(&self, palette: &Palette, chain: &Chain) -> Vec<Shape> {
+    /// Whether the ghost is drawn.
+    fn shows_ghost(&self) -> bool {
+        self.shown.ghost && self.ghost.nodes != self.pose.nodes
+    }
+
+    /// Everything that is drawn besides the surface; the first so many of it cast a shadow.
+    fn shapes(&self, palette: &Palette, chain: &Chain) -> (Vec<Shape>, usize) {
         let unit = LINK * self.extent;
         let plain = |link: usize| !self.links.as_ref().is_some_and(|links| links.is_shaped(link));
         let mut cones = solid::links(chain, &self.pose, plain, unit, figure_colour(palette.link));
@@ -262,7 +322,12 @@ impl SceneView {
             cones.push(Cone::ball(self.pose.nodes[grip.node], HELD_BALL * unit, ghost));
         }
         let mut shapes: Vec<Shape> = cones.iter().map(Shape::from).collect();
-        if self.shown.ghost && self.ghost.nodes != self.pose.nodes {
+        let casting = shapes.len();
+        if let (Some(vertex), Some(body)) = (self.probed, &self.body) {
+            let ball = Cone::ball(body.rest(vertex).as_dvec3(), PROBED_BALL * unit, figure_colour(palette.here));
+            shapes.push(Shape::from(&ball).unlit().anchored(vertex));
+        }
+        if self.shows_ghost() {
             let bare = solid::links(chain, &self.ghost, |_| true, GHOST * unit, ghost);
             shapes.extend(bare.iter().map(|cone| Shape::from(cone).unlit()));
         }
@@ -284,6 +349,6 @@ impl SceneView {
                 shapes.extend(cones.iter().map(|cone| Shape::from(cone).anchored(node)));
             }
         }
-        shapes
+        (shapes, casting)
     }
 }

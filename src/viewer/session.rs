@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     Error, JointVector,
-    render::{haptic::Haptics, passivity::Advice},
+    render::{flags::Fault, haptic::Haptics, passivity::Advice},
     scene::HapticsSpec,
 };
 use eframe::egui::Ui;
@@ -89,6 +89,15 @@ impl Session {
         if both || self.cloud_first {
             let height = ui.available_height() - FINE_GAP;
             self.cloud.show(ui, &self.loaded, q, height);
+        }
+    }
+
+    /// Lets a loop that was held up go on by itself where no device is led by it: there is nobody whom it could hurt.
+    pub fn go_on_without_a_device(&mut self) {
+        use Fault::{Late, Overrun, Stale, Unsolved};
+        let fault = self.history.last().and_then(|tick| tick.fault);
+        if self.lead.is_none() && matches!(fault, Some(Late | Overrun | Stale | Unsolved)) {
+            self.feel.clear_fault();
         }
     }
 

@@ -44,7 +44,16 @@ pub struct Slices {
     follow: bool,
     /// Grid line of every joint.
     lines: Vec<usize>,
-    drawn: Option<(Key, TextureHandle, ColourMap)>,
+    drawn: Option<Drawn>,
+}
+
+/// A plane as it was drawn.
+struct Drawn {
+    key: Key,
+    picture: TextureHandle,
+    map: ColourMap,
+    /// The edge of contact: lines between cells, from end to end.
+    edge: Vec<[[f64; 2]; 2]>,
 }
 
 /// Everything that a picture depends on.
@@ -161,15 +170,16 @@ impl Slices {
         let dark = ui.visuals().dark_mode;
         let key = Key { column: self.column, axes: self.axes, lines, dark, dataset: std::sync::Arc::as_ptr(dataset) };
         match &self.drawn {
-            Some((known, _, map)) if *known == key => *map,
+            Some(drawn) if drawn.key == key => drawn.map,
             drawn => {
                 let map = match drawn {
-                    Some((known, _, map)) if known.column == key.column && known.dataset == key.dataset => *map,
+                    Some(drawn) if drawn.key.column == key.column && drawn.key.dataset == key.dataset => drawn.map,
                     _ => self.column.map(dataset),
                 };
                 let image = picture(dataset, &key, map, &palette::of(ui.visuals()));
-                let texture = ui.ctx().load_texture("C-space plane", image, TextureOptions::NEAREST);
-                self.drawn = Some((key, texture, map));
+                let picture = ui.ctx().load_texture("C-space plane", image, TextureOptions::NEAREST);
+                let edge = edge(dataset, &key);
+                self.drawn = Some(Drawn { key, picture, map, edge });
                 map
             }
         }
@@ -178,14 +188,14 @@ impl Slices {
     fn plot(&mut self, ui: &mut Ui, loaded: &Loaded, q: &JointVector, history: &History, height: f32) {
         let grid = &loaded.dataset.grid;
         let palette = palette::of(ui.visuals());
-        let Some((key, texture, _)) = &self.drawn else { return };
+        let Some(Drawn { key, picture, edge, .. }) = &self.drawn else { return };
         let [across, up] = self.axes.map(|axis| &grid.axes[axis]);
         let single = grid.joints() == 1;
         let extent = |axis: &crate::dataset::Axis| [axis.start - 0.5 * axis.step, axis.last() + 0.5 * axis.step];
         let ([left, right], [low, high]) = (extent(across), if single { [0.0, 1.0] } else { extent(up) });
         let image = PlotImage::new(
             "grid points",
-            texture.id(),
+            picture.id(),
             PlotPoint::new(0.5 * (left + right), 0.5 * (low + high)),
             vec2((right - left) as f32, (high - low) as f32),
         )
@@ -209,8 +219,12 @@ impl Slices {
             .default_x_bounds(left, right)
             .default_y_bounds(low, high)
             .set_margin_fraction(vec2(0.0, 0.0))
-            .custom_x_axes(vec![theme::across(&format!("{} [{}]", across.name, across.unit))])
-            .custom_y_axes(vec![theme::upward(&format!("{} [{}]", up.name, up.unit))])
+            .custom_x_axes(vec![
+                theme::across(&format!("{} [{}]", across.name, across.unit)).formatter(theme::mark_number),
+            ])
+            .custom_y_axes(vec![theme::upward(&format!("{} [{}]", up.name, up.unit)).formatter(theme::mark_number)])
+            .x_grid_spacer(theme::marks)
+            .y_grid_spacer(theme::marks)
             .show_axes([true, !single])
             .show_crosshair(false)
             .label_formatter(move |position| {
@@ -227,6 +241,10 @@ impl Slices {
             });
         let shown = plot.show(ui, |plot| {
             plot.image(image);
+            for ends in edge {
+                let line = Line::new("edge of contact", ends.to_vec()).color(palette.here).width(HAIRLINE);
+                plot.line(line.allow_hover(false));
+            }
             plot.line(Line::new("trail", trail).color(palette.force).width(FINE_CURVE).allow_hover(false));
             if !flagged.is_empty() {
                 let marks = Points::new("not converged", flagged).shape(MarkerShape::Cross).radius(CROSS);
@@ -289,6 +307,35 @@ fn plane<'a>(grid: &'a Grid, key: &'a Key) -> impl Iterator<Item = ([usize; 2], 
             ([column, row], grid.point((0..grid.joints()).map(line)))
         })
     })
+}
+
+/// The edge of contact in a plane: the lines between its cells where one is in contact and the next is not.
+fn edge(dataset: &Dataset, key: &Key) -> Vec<[[f64; 2]; 2]> {
+    let grid = &dataset.grid;
+    let [across, up] = key.axes;
+    let single = across == up;
+    let [columns, rows] = [grid.axes[across].count, if single { 1 } else { grid.axes[up].count }];
+    let mut touches = vec![false; columns * rows];
+    for ([column, row], point) in plane(grid, key) {
+        touches[row * columns + column] = dataset.status(point).is_in_contact();
+    }
+    // Lines between cells, counted from the first one's outer side.
+    let line = |joint: usize, line: usize| grid.axes[joint].start + grid.axes[joint].step * (line as f64 - 0.5);
+    let height = |row: usize| if single { row as f64 } else { line(up, row) };
+    let differ = |a: [usize; 2], b: [usize; 2]| touches[a[1] * columns + a[0]] != touches[b[1] * columns + b[0]];
+    let mut lines = Vec::new();
+    for row in 0..rows {
+        for column in 0..columns {
+            let [left, right] = [line(across, column), line(across, column + 1)];
+            if column > 0 && differ([column - 1, row], [column, row]) {
+                lines.push([[left, height(row)], [left, height(row + 1)]]);
+            }
+            if row > 0 && differ([column, row - 1], [column, row]) {
+                lines.push([[left, height(row)], [right, height(row)]]);
+            }
+        }
+    }
+    lines
 }
 
 fn picture(dataset: &Dataset, key: &Key, map: ColourMap, palette: &Palette) -> ColorImage {

@@ -4,6 +4,7 @@
 use super::{
     aspect,
     guide::{Guide, Keys},
+    in_picture,
     node_drag::NodeDrag,
 };
 use crate::{
@@ -23,11 +24,12 @@ pub struct Steering {
 }
 
 /// Actions of pointer and keys over the scene, for the window's help.
-pub const HELP: [(&str, &str); 8] = [
+pub const HELP: [(&str, &str); 9] = [
     ("Drag a node of the arm", "move the device"),
     ("A D, W S, Q E", "turn its joints 1, 2, 3"),
     ("F H, T G, R Y", "turn its joints 4, 5, 6"),
     ("Home", "lead it back to the start"),
+    ("Click the object", "probe a vertex"),
     ("Drag elsewhere", "orbit"),
     ("Right-drag, Shift-drag", "pan"),
     ("Wheel, pinch", "zoom"),
@@ -54,10 +56,7 @@ impl Steering {
     /// proxy's as it is shown there.
     pub fn steer(&mut self, ui: &Ui, response: &Response, rect: Rect, chain: &Chain, pose: &Pose, guide: &mut Guide) {
         let aspect = aspect(rect);
-        let at = |p: Pos2| {
-            let from_centre = p - rect.center();
-            DVec2::new((2.0 * from_centre.x / rect.width()).into(), (-2.0 * from_centre.y / rect.height()).into())
-        };
+        let at = |place: Pos2| in_picture(rect, place);
         let pressed = ui.input(|input| input.pointer.press_origin());
         if !guide.is_handed_over()
             && response.drag_started_by(PointerButton::Primary)

@@ -24,7 +24,8 @@ pub fn show(ui: &Ui, loaded: &Loaded) -> bool {
                 ui.add_space(GAP);
             }
             ui.label(
-                RichText::new("Try it: drag a dark node of the arm into the object, or click Press above.").strong(),
+                RichText::new("Try it: drag the arm by one of its nodes into the object, or click Press above.")
+                    .strong(),
             );
             ui.add_space(GAP);
             wanted = !ui.add_sized(LONE_BUTTON, Button::new("Got it")).clicked();

@@ -8,9 +8,10 @@ use super::{
 };
 use crate::{
     draw::{camera::Camera, colour::ColourMap},
-    gpu::{Context, FrameUpdate, GpuError},
+    gpu::{Context, GpuError},
     object::Object,
 };
+use glam::{Mat4, Vec3};
 use std::sync::Arc;
 
 /// The surface to draw: buffers on the device.
@@ -42,6 +43,8 @@ pub struct Look {
     pub colour_top: f32,
     /// Width of the triangles' edges (pixels); 0 for none.
     pub edge_width: f32,
+    /// Height of the ground, on which everything casts its shadow straight down (m), and the shadow's colour, 0 to 1.
+    pub ground: (f32, [f32; 3]),
 }
 
 /// Pipelines and targets.
@@ -50,7 +53,8 @@ pub struct ViewRenderer {
     surface: wgpu::RenderPipeline,
     links: wgpu::RenderPipeline,
     shapes: wgpu::RenderPipeline,
-    view: wgpu::Buffer,
+    /// For the picture and for the shadow in it.
+    views: [wgpu::Buffer; 2],
     unit: wgpu::Buffer,
     unit_vertices: u32,
     /// Stands for the state where there is no object.
@@ -72,11 +76,12 @@ struct Targets {
 const LARGEST_SIDE: u32 = 8192;
 
 impl Surface {
-    /// `object` as `update` moves it.
+    /// `object`, its nodes' displacements (m) and the contact forces on them (N) in the buffers `moved`, four numbers a
+    /// node.
     ///
     /// # Errors
     /// When the device refuses the buffers.
-    pub fn new(context: &Context, object: &Object, update: &FrameUpdate) -> Result<Self, GpuError> {
+    pub fn new(context: &Context, object: &Object, moved: [&wgpu::Buffer; 2]) -> Result<Self, GpuError> {
         let rest: Vec<[f32; 4]> = object.rest.iter().map(|point| point.as_vec3().extend(0.0).to_array()).collect();
         let topology = &object.topology;
         let mut mesh: Vec<u32> = object.triangles.as_flattened().to_vec();
@@ -88,7 +93,8 @@ impl Surface {
         let rest = storage("drawn rest positions", bytemuck::cast_slice(&rest))?;
         let mesh = storage("drawn mesh", bytemuck::cast_slice(&mesh))?;
         let nodes = topology.around_offsets.len().saturating_sub(1) as u32;
-        let bindings = [rest, update.state_buffer().clone(), update.force_buffer().clone(), mesh];
+        let [state, forces] = moved.map(Clone::clone);
+        let bindings = [rest, state, forces, mesh];
         Ok(Self { bindings, nodes, triangles: object.triangles.len() as u32 })
     }
 }
@@ -100,7 +106,7 @@ impl ViewRenderer {
     /// When the device refuses them.
     pub fn new(context: Arc<Context>, samples: u32) -> Result<Self, GpuError> {
         let unit_shape = unit_shape();
-        let (surface, links, shapes, view, unit, no_state) = context.scoped(|device| {
+        let (surface, links, shapes, views, unit, no_state) = context.scoped(|device| {
             let view = wgpu::BufferDescriptor {
                 label: Some("view"),
                 size: size_of::<View>() as u64,
@@ -112,16 +118,17 @@ impl ViewRenderer {
                 pipelines::surface(device, samples),
                 pipelines::links(device, samples),
                 pipelines::shapes(device, samples),
-                device.create_buffer(&view),
+                [(); 2].map(|()| device.create_buffer(&view)),
                 filled("unit shape", bytemuck::cast_slice(&unit_shape), wgpu::BufferUsages::VERTEX),
                 filled("no state", &[0; 16], wgpu::BufferUsages::STORAGE),
             )
         })?;
         let unit_vertices = unit_shape.len() as u32;
-        Ok(Self { context, surface, links, shapes, view, unit, unit_vertices, no_state, samples, targets: None })
+        Ok(Self { context, surface, links, shapes, views, unit, unit_vertices, no_state, samples, targets: None })
     }
 
     /// Draws one picture of `size` pixels and returns its texture; the texture is the same one until the size changes.
+    /// Of the shapes, the first `casting` cast a shadow.
     ///
     /// # Errors
     /// When the device fails.
@@ -132,7 +139,7 @@ impl ViewRenderer {
         look: &Look,
         surface: Option<&Surface>,
         links: Option<&DrawnLinks<'_>>,
-        shapes: &[Shape],
+        (shapes, casting): (&[Shape], usize),
     ) -> Result<&wgpu::Texture, GpuError> {
         let size = size.map(|pixels| pixels.clamp(1, LARGEST_SIDE));
         let targets = match self.targets.take().filter(|targets| targets.size == size) {
@@ -141,41 +148,50 @@ impl ViewRenderer {
         };
         let targets = self.targets.insert(targets);
         let view = view(size, camera, look, surface);
-        self.context.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+        let shadow = cast(view, look.ground);
+        for (buffer, view) in self.views.iter().zip([view, shadow]) {
+            self.context.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&view));
+        }
+        // From below, the ground does not hide what stands on it.
+        let counts = [shapes.len(), casting];
+        let drawn = if camera.eye().z > f64::from(look.ground.0) { 2 } else { 1 };
         let commands = self.context.scoped(|device| {
             let mut encoder = device.create_command_encoder(&Default::default());
             let mut pass = targets.begin(&mut encoder, look.background);
-            if let Some(surface) = surface {
-                let [rest, state, forces, mesh] = &surface.bindings;
-                let bound = bind(device, &self.surface, &[&self.view, rest, state, forces, mesh]);
-                pass.set_pipeline(&self.surface);
-                pass.set_bind_group(0, &bound, &[]);
-                pass.draw(0..3 * surface.triangles, 0..1);
-            }
-            if let Some(DrawnLinks { links, frames, colour }) = links {
-                let buffer =
-                    |label, contents: &[u8], usage| filled(device, &self.context.queue, label, contents, usage);
+            let buffer = |label, contents: &[u8], usage| filled(device, &self.context.queue, label, contents, usage);
+            let links = links.map(|DrawnLinks { links, frames, colour }| {
                 let frames = buffer("frames", bytemuck::cast_slice(frames), wgpu::BufferUsages::STORAGE);
                 let [red, green, blue] = colour.channels();
                 let colour = [red, green, blue, 1.0];
-                let colour = buffer("colour of links", bytemuck::cast_slice(&colour), wgpu::BufferUsages::VERTEX);
-                let bound = bind(device, &self.links, &[&self.view, &frames]);
-                pass.set_pipeline(&self.links);
-                pass.set_bind_group(0, &bound, &[]);
-                pass.set_vertex_buffer(0, links.corners.slice(..));
-                pass.set_vertex_buffer(1, colour.slice(..));
-                pass.draw(0..links.count, 0..1);
-            }
-            if !shapes.is_empty() {
-                let contents = bytemuck::cast_slice(shapes);
-                let instances = filled(device, &self.context.queue, "shapes", contents, wgpu::BufferUsages::VERTEX);
-                let state = surface.map_or(&self.no_state, |surface| &surface.bindings[1]);
-                let bound = bind(device, &self.shapes, &[&self.view, state]);
-                pass.set_pipeline(&self.shapes);
-                pass.set_bind_group(0, &bound, &[]);
-                pass.set_vertex_buffer(0, instances.slice(..));
-                pass.set_vertex_buffer(1, self.unit.slice(..));
-                pass.draw(0..self.unit_vertices, 0..shapes.len() as u32);
+                (links, frames, buffer("colour of links", bytemuck::cast_slice(&colour), wgpu::BufferUsages::VERTEX))
+            });
+            let instances = (!shapes.is_empty())
+                .then(|| buffer("shapes", bytemuck::cast_slice(shapes), wgpu::BufferUsages::VERTEX));
+            for (view, count) in self.views.iter().zip(counts).take(drawn) {
+                if let Some(surface) = surface {
+                    let [rest, state, forces, mesh] = &surface.bindings;
+                    let bound = bind(device, &self.surface, &[view, rest, state, forces, mesh]);
+                    pass.set_pipeline(&self.surface);
+                    pass.set_bind_group(0, &bound, &[]);
+                    pass.draw(0..3 * surface.triangles, 0..1);
+                }
+                if let Some((links, frames, colour)) = &links {
+                    let bound = bind(device, &self.links, &[view, frames]);
+                    pass.set_pipeline(&self.links);
+                    pass.set_bind_group(0, &bound, &[]);
+                    pass.set_vertex_buffer(0, links.corners.slice(..));
+                    pass.set_vertex_buffer(1, colour.slice(..));
+                    pass.draw(0..links.count, 0..1);
+                }
+                if let Some(instances) = &instances {
+                    let state = surface.map_or(&self.no_state, |surface| &surface.bindings[1]);
+                    let bound = bind(device, &self.shapes, &[view, state]);
+                    pass.set_pipeline(&self.shapes);
+                    pass.set_bind_group(0, &bound, &[]);
+                    pass.set_vertex_buffer(0, instances.slice(..));
+                    pass.set_vertex_buffer(1, self.unit.slice(..));
+                    pass.draw(0..self.unit_vertices, 0..count as u32);
+                }
             }
             drop(pass);
             encoder.finish()
@@ -209,7 +225,15 @@ fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>)
         triangles: surface.map_or(0, |surface| surface.triangles),
         quantity: u32::from(look.quantity == Quantity::Force),
         padding: [0; 3],
+        shade: [0.0; 4],
     }
+}
+
+/// `view` of everything laid flat on the ground, in the shadow's colour.
+fn cast(view: View, (height, [red, green, blue]): (f32, [f32; 3])) -> View {
+    let flat = Mat4::from_translation(Vec3::new(0.0, 0.0, height)) * Mat4::from_scale(Vec3::new(1.0, 1.0, 0.0));
+    let clip = Mat4::from_cols_array_2d(&view.clip) * flat;
+    View { clip: clip.to_cols_array_2d(), edge_width: 0.0, shade: [red, green, blue, 1.0], ..view }
 }
 
 impl Targets {

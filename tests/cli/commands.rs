@@ -257,7 +257,7 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
     let path = |name: &str| folder.path().join(name);
     let motion = "\n[motion]\npress = [{ time = 0.0, q = [0.0] }, { time = 0.2, q = [0.25] }]\n";
     std::fs::write(path("finger.toml"), format!("{FINGER}{motion}")).unwrap();
-    json(folder.path(), &["bake", "finger.toml", "--backend", "cpu", "--json"]);
+    json(folder.path(), &["bake", "finger.toml", "--backend", "cpu", "--measure-error", "0", "--json"]);
     let play = |arguments: &[&str]| json(folder.path(), &[&["play", "finger.haptize", "--json"], arguments].concat());
     let first = play(&["--realtime", "--record", "r.csv", "-o", "first"]);
     assert!(first["contact_share"].as_f64() > Some(0.0), "{first}");
@@ -327,7 +327,7 @@ fn stiff_arm() -> String {
 fn a_scene_that_names_neither_motions_nor_damping_is_pressed_and_scraped_passively() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("arm.toml"), stiff_arm()).unwrap();
-    json(folder.path(), &["bake", "arm.toml", "--backend", "cpu", "--json"]);
+    json(folder.path(), &["bake", "arm.toml", "--backend", "cpu", "--measure-error", "0", "--json"]);
     for motion in ["press", "scrape"] {
         let output = haptize(folder.path(), &["play", "arm.haptize", "--motion", motion, "--json"]);
         let told = text(&output.stderr);
@@ -347,7 +347,7 @@ fn a_scene_that_names_neither_motions_nor_damping_is_pressed_and_scraped_passive
     let bake = |damping: &str| {
         let scene = stiff_arm().replace("[graphics]", &format!("[haptics]\nproxy_damping = {damping}\n[graphics]"));
         std::fs::write(folder.path().join("named.toml"), scene).unwrap();
-        json(folder.path(), &["bake", "named.toml", "--backend", "cpu", "--json"]);
+        json(folder.path(), &["bake", "named.toml", "--backend", "cpu", "--measure-error", "0", "--json"]);
         text(&haptize(folder.path(), &["play", "named.haptize", "--seconds", "0.1"]).stderr)
     };
     let told = bake("0.02");

@@ -61,8 +61,13 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     let PlanSpec::Workspace(plan) = &mut part.scan.plan else { unreachable!() };
     (plan.start.y, plan.across[0].count, plan.across[1].count) = (-0.012, 5, 8);
     let samples = scanned(&part, 1);
-    let options =
-        GridizeOptions { steps: vec![0.03], epsilon: Some(0.01), interpolation: Interpolation::Linear, smooth: false };
+    let options = GridizeOptions {
+        steps: vec![0.03],
+        epsilon: Some(0.01),
+        interpolation: Interpolation::Linear,
+        smooth: false,
+        within: f64::INFINITY,
+    };
     let (mut block, report) = gridize(&samples, &options).unwrap();
     block.scene.clone_from(&part.text);
     let (setup, trace) = felt(&block, |setup| &setup.scene.motion.press);

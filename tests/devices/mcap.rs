@@ -123,6 +123,7 @@ fn strokes_in_a_recording_of_a_robot_tell_friction_as_those_in_a_table_do() {
         epsilon: None,
         interpolation: haptize::gridize::Interpolation::Linear,
         smooth: false,
+        within: f64::INFINITY,
     };
     let (dataset, _) = gridize_sliding(&of_robot.samples.joints, &reversals, &options).unwrap();
     let forces = &dataset.slip.as_ref().unwrap().normal_force;

@@ -154,7 +154,7 @@ fn ball(cell: f64, inclusions: Vec<InclusionSpec>) -> Result<Object, Error> {
 #[test]
 fn an_inclusion_like_the_rest_changes_nothing() {
     let same = sphere(DVec3::new(0.01, 0.0, 0.02), 0.02, YOUNG, 0.3);
-    let (plain, same) = (ball(0.01, vec![]).unwrap(), ball(0.01, vec![same]).unwrap());
+    let (plain, same) = (ball(0.02, vec![]).unwrap(), ball(0.02, vec![same]).unwrap());
     let scale = plain.mechanics().unwrap().stiffness.norm();
     for (a, b) in plain.mechanics().unwrap().stiffness.blocks.iter().zip(&same.mechanics().unwrap().stiffness.blocks) {
         assert!((*a - *b).to_cols_array().iter().all(|x| x.abs() < 1e-13 * scale));
@@ -194,17 +194,19 @@ fn a_composite_sphere_has_hashins_bulk_modulus() {
         let shear = 4.0 * YOUNG / (2.0 * 1.3);
         let hashin = 1.0 + c * (ki - km) / km * (3.0 * km + shear) / (3.0 * km + shear + 3.0 * (1.0 - c) * (ki - km));
         let inner = sphere(DVec3::ZERO, radius, factor * YOUNG, poisson);
-        let errors = [(0.02, &plain[0]), (0.01, &plain[1])]
-            .map(|(cell, plain)| radial(plain) / radial(&ball(cell, vec![inner]).unwrap()) / hashin - 1.0);
-        println!("{factor} {poisson} {part}: {errors:?} of {hashin}");
-        assert!(errors.iter().all(|error| error.abs() < 0.03), "{errors:?}");
+        // Cells of half the size, which take thirty times as long, for the largest one alone.
+        for (cell, plain) in [(0.02, &plain[0]), (0.01, &plain[1])].into_iter().take(1 + usize::from(part == 0.8)) {
+            let error = radial(plain) / radial(&ball(cell, vec![inner]).unwrap()) / hashin - 1.0;
+            assert!(error.abs() < 0.03, "{factor} {poisson} {part}, cells of {cell}: {error} of {hashin}");
+        }
     }
 }
 
 #[test]
 fn the_last_of_overlapping_inclusions_counts() {
-    let ball = |inclusions: Vec<InclusionSpec>| ball(0.01, inclusions);
-    let (stiff, core) = (sphere(DVec3::ZERO, 0.03, 1e6, 0.3), sphere(DVec3::ZERO, 0.02, YOUNG, 0.3));
+    let ball = |inclusions: Vec<InclusionSpec>| ball(0.02, inclusions);
+    // The elements about the middle end within the core.
+    let (stiff, core) = (sphere(DVec3::ZERO, 0.045, 1e6, 0.3), sphere(DVec3::ZERO, 0.036, YOUNG, 0.3));
     let (plain, hollow) = (ball(vec![]).unwrap(), ball(vec![stiff, core]).unwrap());
     // Near the middle the core is like the plain ball, and farther out it is not.
     let same = |near: DVec3| {
@@ -220,7 +222,7 @@ fn the_last_of_overlapping_inclusions_counts() {
             (*a - *b).to_cols_array().iter().all(|x| x.abs() < 1e-12 * plain.mechanics().unwrap().stiffness.norm())
         })
     };
-    assert!(same(DVec3::ZERO) && !same(DVec3::X * 0.025));
+    assert!(same(DVec3::ZERO) && !same(DVec3::X * 0.04));
     for hidden in [vec![core, stiff], vec![stiff, sphere(DVec3::X, 0.01, 1e5, 0.3)]] {
         let hidden = ball(hidden).unwrap_err();
         assert!(hidden.to_string().contains("no part of the solid is in the inclusion"), "{hidden}");

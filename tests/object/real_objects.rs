@@ -19,7 +19,13 @@ use std::path::PathBuf;
 const SEED: u64 = 1;
 
 fn options(step: f64, epsilon: f64) -> GridizeOptions {
-    GridizeOptions { steps: vec![step], epsilon: Some(epsilon), interpolation: Interpolation::Linear, smooth: false }
+    GridizeOptions {
+        steps: vec![step],
+        epsilon: Some(epsilon),
+        interpolation: Interpolation::Linear,
+        smooth: false,
+        within: f64::INFINITY,
+    }
 }
 
 /// Scans the part of `datasets/NAME.toml` that `part` leaves of its plan, and gridizes it at the paper's 0.03 rad.

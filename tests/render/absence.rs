@@ -8,7 +8,7 @@ use haptize::{
     dataset::Dataset,
     device::{Motion, Recorded},
     field::range::HaptizedRange,
-    gpu::{AdapterChoice, Context, FrameMethod, FrameUpdate, GpuSolver},
+    gpu::{AdapterChoice, Context, GpuSolver},
     object::{Factor, Object},
     proxy::Chain,
     render::{
@@ -280,65 +280,12 @@ fn made<T>(context: &Context, make: impl FnOnce() -> T) -> (T, (BTreeMap<String,
 }
 
 #[test]
-fn on_the_gpu_the_body_force_of_a_past_acts_as_contact_forces_do() {
-    let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-    let object = Object::build(&sphere().object).unwrap();
-    let (method, effects) = (FrameMethod::Inverse, haptize::scene::GraphicsEffects::default());
-    let of = |remembers| {
-        FrameUpdate::remembering(Arc::clone(&context), &object, 1.0 / 60.0, method, &effects, remembers).unwrap()
-    };
-    let (mut remembering, mut plain) = (of(true), of(false));
-    let force = |k: usize| DVec3::new(0.01 * (k % 5) as f64, -0.02 * (k % 3) as f64, -0.03 * (k % 7) as f64);
-    let contact: Vec<DVec3> = (0..object.rest.len()).map(force).collect();
-    let past: Vec<DVec3> = contact.iter().rev().copied().collect();
-    let sum: Vec<DVec3> = contact.iter().zip(&past).map(|(a, b)| *a + *b).collect();
-    for _ in 0..5 {
-        remembering.step_remembering(&contact, &past).unwrap();
-        plain.step(&sum).unwrap();
-    }
-    let (moved, _) = plain.read().unwrap();
-    assert_eq!(remembering.read().unwrap().0, moved);
-    assert!(moved.iter().any(|u| u.length() > 1e-5));
-}
-
-#[test]
-fn on_the_gpu_each_effect_makes_its_own_buffers_and_pipelines_and_no_others() {
+fn a_gpu_that_haptizes_knows_of_no_effect() {
     let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
     if context.adapter().interface != "Vulkan" {
         // Others keep no such books.
         return;
     }
-    let object = Object::build(&sphere().object).unwrap();
-    let mut alive = Vec::new();
-    for method in [FrameMethod::Inverse, FrameMethod::Iterations(3)] {
-        let mut update = |effects: &[Effect]| {
-            let effects = sphere().with_effects(true, effects).unwrap().graphics.unwrap().effects;
-            // A device compiles a kernel once: each update has one of its own.
-            let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
-            let new = || FrameUpdate::new(Arc::clone(&context), &object, 1.0 / 60.0, method, &effects).unwrap();
-            let (update, (labels, pipelines)) = made(&context, new);
-            let takes = update.takes();
-            assert_eq!((labels.values().sum(), pipelines), (takes.buffers, takes.pipelines), "{effects:?}: {labels:?}");
-            alive.push(update);
-            (labels, pipelines, takes.dispatches)
-        };
-        let (plain, pipelines, dispatches) = update(&[]);
-        for effect in EFFECTS {
-            let mut expected = (plain.clone(), pipelines, dispatches);
-            let mut more = |label: &str| expected.0.insert(label.to_owned(), 1);
-            match effect.key {
-                "gravity" => assert_eq!(more("frame loads"), None),
-                "stiffening" => {
-                    assert_eq!((more("frame loads"), more("reach of the springs")), (None, None));
-                    expected = (expected.0, pipelines + 1, dispatches + 1);
-                }
-                "quasi_static" => assert_eq!(expected.0.remove("masses and damping"), Some(1)),
-                _ => {}
-            }
-            assert_eq!(update(&[effect]), expected, "{} with {method:?}", effect.key);
-        }
-    }
-    // What haptizes knows of no effect.
     let [plain, felt] = [&[][..], &EFFECTS[..5]].map(|effects| {
         let scene = sphere().with_effects(false, effects).unwrap();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));

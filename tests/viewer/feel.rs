@@ -12,7 +12,7 @@ fn a_motion_plays_pauses_and_is_scrubbed() {
     assert!(window.shows("free") && window.torque() == 0.0);
     window.click("Press");
     window.pass(2.2);
-    assert!(window.torque() > 0.1 && window.shows("nodes in contact"), "{}", window.torque());
+    assert!(window.torque() > 0.1 && window.shows("vertices in contact"), "{}", window.torque());
     window.click("Pause");
     let held = window.torque();
     window.pass(0.5);
@@ -50,7 +50,7 @@ fn a_drag_ends_in_contact_and_shows_torque() {
     let end = from + 20.0 * vec2(5.0, 4.0);
     window.pass(0.5);
     assert!(window.torque() > 0.05, "no torque: {}", window.torque());
-    assert!(window.shows("nodes in contact"));
+    assert!(window.shows("vertices in contact"));
     window.harness.event(button(end, false));
     window.harness.step();
     // The hand stays where it was let go, and keeps pressing.
@@ -153,14 +153,14 @@ fn a_device_leads_the_arm_and_goes_on_under_other_gains_and_in_other_files() {
     // The simulated device goes along the scene's press by itself.
     window.pass(2.2);
     let pressed = window.torque();
-    assert!(pressed > 0.1 && window.shows("nodes in contact"), "{pressed}");
+    assert!(pressed > 0.1 && window.shows("vertices in contact"), "{pressed}");
     // The same device in another loop: it goes on from where it is.
     window.harness.get_by_label("Boundary slope Ks").set_value_accesskit(12.0);
     window.harness.run_ok();
     window.wait();
     window.pass(0.1);
     assert_eq!(window.harness.state().error(), None);
-    assert!(window.torque() > 0.05 && window.shows("nodes in contact"), "{}", window.torque());
+    assert!(window.torque() > 0.05 && window.shows("vertices in contact"), "{}", window.torque());
     // A file that is opened has it from its beginning.
     let ctx = window.harness.ctx.clone();
     window.harness.state_mut().start(&Start::File(SPHERE.1.clone()), &ctx);
@@ -316,7 +316,7 @@ fn an_object_that_relaxes_and_rubs_shows_its_dent_and_the_ellipse_of_friction() 
         assert_eq!(window.harness.state().error(), None);
         window.click("Press");
         window.pass(2.2);
-        assert!(window.shows("nodes in contact"), "{name}");
+        assert!(window.shows("vertices in contact"), "{name}");
         (window.shows("dent "), window.picture_of("Plane of C-space"))
     };
     let (shows_dent, plane) = open("elastic.haptize", "");

@@ -152,7 +152,7 @@ fn a_scanned_dataset_shows_the_proxy_and_its_c_space_and_says_what_is_not_stored
     window.click("Press");
     window.pass(2.2);
     assert!(window.torque() > 0.1, "the proxy feels nothing: {}", window.torque());
-    assert!(window.shows("in contact, nodes not stored") && !window.shows("0 nodes"));
+    assert!(window.shows("in contact, vertices not known") && !window.shows("0 vertices"));
     window.click("Contacts");
     assert!(window.shows("Nodes in contact are not stored") && !window.shows("object nodes in contact"));
     window.click("Energy");

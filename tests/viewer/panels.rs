@@ -166,3 +166,50 @@ fn the_window_says_what_pointer_and_keys_do_and_what_draws() {
         assert!(window.shows(help), "{help} is missing");
     }
 }
+
+#[test]
+fn numbers_over_the_picture_say_where_the_arm_is_and_a_click_probes_the_object() {
+    let mut window = Window::sphere();
+    window.click("Press");
+    window.pass(2.0);
+    // Each joint in its own unit, the tip, the force, and what the colours mean.
+    for label in ["rad", "N m", "tip", "mm", "force", "vertex in contact", "force on the arm, longest"] {
+        assert!(window.shows(label), "{label} is missing");
+    }
+    let numbers = |window: &Window| {
+        let all = window.harness.query_all_by_label_contains(" N");
+        all.filter_map(|node| node.accesskit_node().value().or_else(|| node.accesskit_node().label()))
+            .collect::<Vec<_>>()
+    };
+    let pressed = numbers(&window);
+    let scene = window.harness.get_by_label("3-D scene").rect();
+    assert!(!window.shows("vertex 0") && window.harness.query_all_by_label_contains("vertex ").count() == 1);
+    // The sphere lies below the middle of the picture.
+    let click = |window: &mut Window, at: eframe::egui::Pos2| {
+        window.harness.event(Event::PointerMoved(at));
+        for pressed in [true, false] {
+            let button = eframe::egui::PointerButton::Primary;
+            window.harness.event(Event::PointerButton { pos: at, button, pressed, modifiers: Default::default() });
+        }
+        window.harness.run_ok();
+    };
+    click(&mut window, scene.center() + vec2(0.0, 0.2 * scene.height()));
+    let probed = |window: &Window| window.harness.query_all_by_label_contains("vertex ").count() == 2;
+    assert!(probed(&window), "the object is not probed");
+    assert_ne!(numbers(&window), pressed, "the probed vertex has no force");
+    click(&mut window, scene.right_bottom() - vec2(8.0, 60.0));
+    assert!(!probed(&window), "nothing lies there");
+}
+
+#[test]
+fn a_message_fades_by_itself() {
+    let mut window = Window::sphere();
+    window.pass(0.5);
+    window.click("CSV");
+    assert!(window.shows("viewer-trace.csv"));
+    // A step is a quarter of a second.
+    for _ in 0..40 {
+        window.harness.step();
+    }
+    assert!(!window.shows("viewer-trace.csv"), "the message stays");
+}

@@ -16,6 +16,9 @@
 //! Only nodes that touch somewhere have a row: first those below the surface at rest, and, after the program is solved,
 //! those that the surface has bulged up to, until there are no more. Along a way the rows that pushed last are there
 //! from the beginning ([`Guess::Last`]): the solution is the same, and is found sooner.
+//!
+//! The surface without contact may stand elsewhere than at rest, displaced by s of an object that remembers
+//! ([`RestProgram::standing`]). Depths are then D_i + g_i . s, and u = s - C G^T lambda.
 
 mod sensitivity;
 mod tangent;
@@ -64,6 +67,8 @@ pub struct RestProgram {
     pub elastic: f64,
     /// U (J).
     pub energy: f64,
+    /// Displacement s of each surface node without contact; empty at rest (m).
+    pub standing: Vec<DVec3>,
     limits: RestLimits,
     slots: Vec<Slots>,
     /// Whether each proxy node that has a row pushes.
@@ -89,6 +94,7 @@ impl RestProgram {
             rows: Vec::new(),
             elastic: 0.0,
             energy: 0.0,
+            standing: Vec::new(),
             limits,
             slots: Vec::new(),
             pushes: vec![None; model.chain.nodes.len()],
@@ -161,6 +167,7 @@ impl RestProgram {
 
     /// Adds a row whose proxy node `pushes`, by a guess, and returns whether it is within the limits.
     fn add(&mut self, row: Contact, pushes: bool) -> bool {
+        let depth = self.depth(&row);
         let Self { support, rows, slots, depths, limits, .. } = self;
         let mut own = [0; CARRIERS];
         for (j, (slot, &node)) in own.iter_mut().zip(row.carriers.nodes()).enumerate() {
@@ -173,7 +180,7 @@ impl RestProgram {
         }
         self.pushes[row.proxy_node as usize] = Some(pushes);
         slots.push(own);
-        depths.push(row.depth);
+        depths.push(depth);
         rows.push(row);
         true
     }
@@ -222,7 +229,7 @@ impl RestProgram {
     fn displace(&self, model: &Model, detection: &mut Detection) -> f64 {
         let bound = model.motion_bound(self.elastic);
         detection.displace(model, self.support.nodes(), &self.forces, bound);
-        bound.moved
+        bound.moved + self.farthest()
     }
 
     /// Adds a row for each proxy node without one that the displaced surface has reached, and returns whether they are
@@ -234,18 +241,36 @@ impl RestProgram {
                 return true;
             }
             match detection.at_rest(model, i, moved) {
-                Some(row) if row.depth + linear_change(model, &row, detection) > 0.0 => self.add(row, true),
+                Some(row) if self.depth(&row) + linear_change(model, &row, detection) > 0.0 => self.add(row, true),
                 _ => true,
             }
         })
     }
 
+    /// Farthest that a node stands from where it rests (m).
+    pub fn farthest(&self) -> f64 {
+        self.standing.iter().map(|node| node.length_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Depth of `row` before the surface as it stands without contact (m).
+    fn depth(&self, row: &Contact) -> f64 {
+        if self.standing.is_empty() {
+            return row.depth;
+        }
+        let nodes = row.carriers.nodes();
+        row.depth + row.normal.dot(row.moved(|j| self.standing[nodes[j] as usize]))
+    }
+
     /// Force on the proxy node of row `i`: along the normal, and sideways by how the row changes (N).
     #[must_use]
     pub fn force(&self, i: usize) -> DVec3 {
-        let Self { rows, slots, displacement, .. } = self;
+        let Self { support, rows, slots, displacement, standing, .. } = self;
         let (row, nodes) = (&rows[i], displacement.as_chunks::<3>().0);
-        row.pushed(|j| DVec3::from_array(nodes[slots[i][j] as usize])) * row.multiplier
+        let moved = |slot: usize| {
+            let stands = standing.get(support.nodes()[slot] as usize).copied().unwrap_or_default();
+            DVec3::from_array(nodes[slot]) + stands
+        };
+        row.pushed(|j| moved(slots[i][j] as usize)) * row.multiplier
     }
 
     /// The greatest depth that the forces do not account for, over the greatest at rest (1).

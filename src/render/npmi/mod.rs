@@ -38,6 +38,7 @@ use crate::{
     proxy::Chain,
 };
 use linear::solve_held;
+use std::borrow::Cow;
 use stops::{Side, solve_in_box};
 
 /// Size below which a decaying state of the haptic loop is set to zero, in its SI unit. It is far below anything that
@@ -184,10 +185,10 @@ impl Npmi {
 
     /// L, M and S for a step of `interval` T (s) from `motion`.
     #[must_use]
-    pub fn stage(&self, motion: &Motion, interval: f64) -> MidpointInertia {
+    pub fn stage(&self, motion: &Motion, interval: f64) -> Cow<'_, MidpointInertia> {
         match &self.inertia {
-            Inertia::Constant(stage) => **stage,
-            Inertia::Chain(chain) => MidpointInertia::of(chain, motion, interval),
+            Inertia::Constant(stage) => Cow::Borrowed(stage),
+            Inertia::Chain(chain) => Cow::Owned(MidpointInertia::of(chain, motion, interval)),
         }
     }
 

@@ -45,7 +45,7 @@ const CARRIERS: [usize; 5] = [0, 1, 2, 2, 3];
 /// The scene of `arm.urdf`.
 fn scene() -> Scene {
     let (robot, arm) = arm(&std::fs::read_to_string(file("arm.urdf")).unwrap(), "probe", &[]).unwrap();
-    let nodes = sample(&robot, &arm, 0.006, None).unwrap();
+    let nodes = sample(&robot, &arm, Some(0.006), None).unwrap();
     let text = write_scene(&robot, &arm, &nodes, &[], "haptize import").unwrap();
     Scene::parse(&text, "arm.toml").unwrap()
 }
@@ -126,7 +126,7 @@ fn kinetic_energy_is_that_of_the_files_links() {
 #[test]
 fn contact_nodes_lie_on_the_shapes() {
     let (robot, arm) = arm(&std::fs::read_to_string(file("arm.urdf")).unwrap(), "probe", &[]).unwrap();
-    let nodes = sample(&robot, &arm, 0.006, None).unwrap();
+    let nodes = sample(&robot, &arm, Some(0.006), None).unwrap();
     assert!(
         nodes.of_joints.iter().all(|nodes| nodes.len() > 10),
         "{:?}",

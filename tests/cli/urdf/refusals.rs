@@ -80,7 +80,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
 fn refusal(text: &str) -> String {
     match arm(text, "hand", &[]) {
         Err(error) => error.to_string(),
-        Ok((robot, arm)) => sample(&robot, &arm, 0.01, None).unwrap_err().to_string(),
+        Ok((robot, arm)) => sample(&robot, &arm, Some(0.01), None).unwrap_err().to_string(),
     }
 }
 
@@ -170,13 +170,13 @@ fn requests_that_do_not_fit_the_robot_name_what_does() {
             k + 1
         )
     };
-    let seven = format!("<robot>{}<link name=\"l7\"/></robot>", (0..7).map(joint).collect::<String>());
-    let message = arm(&seven, "l7", &[]).unwrap_err().to_string();
-    assert!(message.contains("7 moving joints") && message.contains("--lock"), "{message}");
-    assert_eq!(arm(&seven, "l7", &[("j3", 0.5)]).unwrap().1.joints.len(), 6);
+    let long = format!("<robot>{}<link name=\"l13\"/></robot>", (0..13).map(joint).collect::<String>());
+    let message = arm(&long, "l13", &[]).unwrap_err().to_string();
+    assert!(message.contains("13 moving joints") && message.contains("--lock"), "{message}");
+    assert_eq!(arm(&long, "l13", &[("j3", 0.5)]).unwrap().1.joints.len(), 12);
     // No shapes, no contact.
-    let (robot, bare) = arm(&seven, "l7", &[("j3", 0.5)]).unwrap();
-    assert!(sample(&robot, &bare, 0.01, None).unwrap_err().to_string().contains("<collision>"));
+    let (robot, bare) = arm(&long, "l13", &[("j3", 0.5)]).unwrap();
+    assert!(sample(&robot, &bare, Some(0.01), None).unwrap_err().to_string().contains("<collision>"));
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn a_mesh_in_millimetres_is_told_with_its_length_and_scale() {
         let robot = Robot::parse(text.to_owned(), folder.path().join("robot.urdf")).unwrap();
         let arm = haptize::urdf::Arm::new(&robot, "hand", &[]).unwrap();
         let notes = haptize::urdf::drawn_shapes(&robot, &arm, None).1;
-        (sample(&robot, &arm, spacing, None).map(|nodes| nodes.spacing).map_err(|error| error.to_string()), notes)
+        (sample(&robot, &arm, Some(spacing), None).map(|nodes| nodes.spacing).map_err(|error| error.to_string()), notes)
     };
     let (refused, notes) = told(&text, 0.005);
     let refused = refused.unwrap_err();
@@ -202,11 +202,11 @@ fn a_mesh_in_millimetres_is_told_with_its_length_and_scale() {
 fn a_spacing_that_makes_too_many_nodes_is_refused_with_one_that_does_not() {
     let (robot, arm) = arm(PLAIN, "hand", &[]).unwrap();
     for spacing in [1e-4, 5e-4, 1e-3] {
-        let message = sample(&robot, &arm, spacing, None).unwrap_err().to_string();
+        let message = sample(&robot, &arm, Some(spacing), None).unwrap_err().to_string();
         let wider: f64 = message.split("--spacing ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
-        assert!(sample(&robot, &arm, wider, None).is_ok(), "{message}");
+        assert!(sample(&robot, &arm, Some(wider), None).is_ok(), "{message}");
     }
     for spacing in [0.0, -1.0, 1e-5, f64::NAN, f64::INFINITY] {
-        assert!(sample(&robot, &arm, spacing, None).unwrap_err().to_string().contains("at least"));
+        assert!(sample(&robot, &arm, Some(spacing), None).unwrap_err().to_string().contains("at least"));
     }
 }

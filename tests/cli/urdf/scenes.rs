@@ -7,7 +7,7 @@ use haptize::{
     dataset::Dataset,
     object::Object,
     proxy::{Chain, Triangles, shape_triangles},
-    scene::{JointKind, LinkForm, Rendering, Scene},
+    scene::{JointKind, LinkForm, MAX_CONTACT_NODES, Rendering, Scene},
 };
 /// Imports, bakes on the CPU and plays; returns the accounts of the play.
 fn felt(robot: &str, tip: &str, spacing: &str) -> serde_json::Value {
@@ -90,6 +90,51 @@ fn packages_are_found_above_the_file_or_where_the_user_says() {
     let arguments =
         ["import", "alone.urdf", "--tip", "probe", "--package-path", &packages, "--spacing", "0.01", "-o", "x.toml"];
     succeed(folder.path(), &arguments);
+    // A folder of another name is the package that its package.xml names.
+    let meshes = folder.path().join("work/meshes");
+    std::fs::create_dir_all(&meshes).unwrap();
+    std::fs::write(folder.path().join("work/package.xml"), "<package><name> robots </name></package>").unwrap();
+    for mesh in std::fs::read_dir(file("meshes")).unwrap() {
+        let mesh = mesh.unwrap();
+        std::fs::copy(mesh.path(), meshes.join(mesh.file_name())).unwrap();
+    }
+    std::fs::rename(&robot, folder.path().join("work/alone.urdf")).unwrap();
+    succeed(folder.path(), &["import", "work/alone.urdf", "--tip", "probe", "--spacing", "0.01", "-o", "y.toml"]);
+}
+
+/// An arm of seven joints that turn in turn about two axes, a rod on each link.
+fn of_seven_joints() -> String {
+    let mut text = "<robot name=\"seven\"><link name=\"l0\"/>".to_owned();
+    for joint in 1..=7 {
+        let (before, axis) = (joint - 1, if joint % 2 == 0 { "0 1 0" } else { "0 0 1" });
+        text += &format!(
+            "<joint name=\"j{joint}\" type=\"revolute\"><parent link=\"l{before}\"/><child link=\"l{joint}\"/>\
+             <origin xyz=\"0 0 0.12\"/><axis xyz=\"{axis}\"/><limit lower=\"-2\" upper=\"2\" effort=\"20\" velocity=\"2\"/>\
+             </joint><link name=\"l{joint}\"><inertial><mass value=\"1\"/><inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\"/>\
+             </inertial><collision><origin xyz=\"0 0 0.05\"/><geometry><cylinder radius=\"0.03\" length=\"0.1\"/></geometry>\
+             </collision></link>"
+        );
+    }
+    text + "</robot>"
+}
+
+#[test]
+fn an_arm_of_seven_joints_is_felt_without_a_grid_and_its_nodes_fit_by_themselves() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("seven.urdf"), of_seven_joints()).unwrap();
+    let imported = json(folder.path(), &["import", "seven.urdf", "--tip", "l7", "--json"]);
+    let nodes: u64 = imported["nodes"].as_array().unwrap().iter().map(|count| count.as_u64().unwrap()).sum();
+    // 5 mm apart there are some 4,900.
+    assert!(nodes > MAX_CONTACT_NODES as u64 / 2 && nodes <= MAX_CONTACT_NODES as u64, "{imported}");
+    let text = std::fs::read_to_string(folder.path().join("seven.toml")).unwrap();
+    assert!(!text.contains("[grid]") && !text.contains("--spacing"), "{text}");
+    let played = json(folder.path(), &["play", "seven.toml", "--motion", "press", "--seconds", "2.2", "--json"]);
+    let number = |key: &str| played[key].as_f64().unwrap();
+    assert!(played["fault"].is_null() && number("contact_share") > 0.02, "{played:#}");
+    assert!(number("max_account_residual") < 1e-10, "{played:#}");
+    let refused = haptize(folder.path(), &["bake", "seven.toml"]);
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(message.contains("7 joints is too many for a grid") && message.contains("haptize play"), "{message}");
 }
 
 /// Greatest distance between a corner of a shape and a contact node that was put on it (m): corners of meshes carry

@@ -1,4 +1,4 @@
-//! Hard cases of the object in motion: stiff springs, any time between frames, forces that chatter, solvers cut short.
+//! Hard cases of the object in motion: stiff springs, any time between frames, forces that chatter.
 //!
 //! All keep one figure: the most that kinetic, elastic and gravitational energy rose in a frame beyond the work of the
 //! forces, over the most that was ever stored. In exact arithmetic it is never positive (`render/object_motion.rs`).
@@ -6,7 +6,6 @@
 use crate::hard_cases::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use glam::DVec3;
 use haptize::{
-    gpu::{FrameMethod, FrameUpdate},
     object::Object,
     render::object_motion::ObjectMotion,
     scene::{
@@ -14,20 +13,15 @@ use haptize::{
         StiffeningSpec,
     },
 };
-use std::sync::Arc;
 
 /// Energy that the object may seem to gain in a frame from nowhere, over the most that it stored (1): sums over up to
 /// 1e5 coordinates, each rounded by eps, of terms that cancel.
 const FRAME_ENERGY_ROUNDING: f64 = 1e-10;
 
-/// The same where the state is f32 (1): each displacement and velocity is rounded by 6e-8, and energy is their square.
-const GPU_FRAME_ENERGY_ROUNDING: f64 = 1e-6;
-
 /// The cases of this file.
-pub(super) const CASES: [Case; 3] = [
+pub(super) const CASES: [Case; 2] = [
     Case { room: "graphics", name: "stiff springs, slow frames", run: stiff },
     Case { room: "graphics", name: "stiffening springs under gravity", run: effects },
-    Case { room: "graphics", name: "solver cut short on the GPU", run: cut_short },
 ];
 
 /// Times between frames T (s).
@@ -124,41 +118,6 @@ fn effects(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
         }
         let varied = format!("{factor} times as stiff when strained, T from 1 ms to 1 s");
         outcomes.push(outcome("stiffening springs under gravity", &varied, &gains, FRAME_ENERGY_ROUNDING));
-    }
-    Ok(outcomes)
-}
-
-fn cut_short(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
-    let object = sphere(SpringKind::Axial, 300.0, setting.effort)?;
-    let spec = StiffeningSpec { factor: 10.0, strain: 0.02 };
-    let stiff = GraphicsEffects { stiffening: Some(spec), ..GraphicsEffects::default() };
-    let (count, pushed) = frames(setting.effort);
-    let rest = vec![DVec3::ZERO; object.rest.len()];
-    let mut outcomes = Vec::new();
-    for iterations in [1, 2, 8] {
-        let mut gains = Vec::new();
-        for effects in [GraphicsEffects::default(), stiff] {
-            for period in [1e-3, 1.0] {
-                let method = FrameMethod::Iterations(iterations);
-                let mut update = FrameUpdate::new(Arc::clone(&setting.gpu), &object, period, method, &effects)?;
-                let twin = ObjectMotion::new(&object, period, &effects)?;
-                let (mut before, mut gain, mut most) = (f64::NAN, f64::NEG_INFINITY, f64::MIN_POSITIVE);
-                for frame in 0..count {
-                    update.step(&if frame < pushed { push(&object, frame, 0.3) } else { rest.clone() })?;
-                    let (u, v) = update.read()?;
-                    let after = twin.energy_of(&u, &v);
-                    most = f64::max(most, after);
-                    // The device keeps no v_hat: only without forces is the work known.
-                    if frame > pushed {
-                        gain = if after.is_finite() { f64::max(gain, after - before) } else { f64::NAN };
-                    }
-                    before = after;
-                }
-                gains.push(gain / most);
-            }
-        }
-        let varied = format!("{iterations} iterations a frame, T of 1 ms and 1 s, with and without stiffening");
-        outcomes.push(outcome("solver cut short on the GPU", &varied, &gains, GPU_FRAME_ENERGY_ROUNDING));
     }
     Ok(outcomes)
 }

@@ -55,7 +55,13 @@ fn samples(points: &[Point], torque: impl Fn(&[f64]) -> f64) -> Samples {
 }
 
 fn options(step: f64) -> GridizeOptions {
-    GridizeOptions { steps: vec![step], epsilon: Some(0.0), interpolation: Interpolation::Linear, smooth: false }
+    GridizeOptions {
+        steps: vec![step],
+        epsilon: Some(0.0),
+        interpolation: Interpolation::Linear,
+        smooth: false,
+        within: f64::INFINITY,
+    }
 }
 
 /// Numbers between 0 and 1 without a visible pattern, the same in every run (fractions of a sine's large multiples).

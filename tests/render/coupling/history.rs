@@ -69,11 +69,24 @@ impl Membrane {
         Self { compliance: rows.into_iter().map(|row| row[NODES..].to_vec()).collect(), points: points.to_vec() }
     }
 
-    /// Distance from a point at which its dent is 1/e as deep (m).
+    /// Way over which the finger leaves the dent that it made: a dent of the same forces so far beside has 1/e of the
+    /// energy in common with it (m). For one point that is how far beside it its dent is 1/e as deep.
     fn dent(&self) -> f64 {
-        let (middle, deepest) = (NODES / 2, self.compliance[NODES / 2][NODES / 2]);
-        let beyond = (middle..NODES).find(|&j| self.compliance[middle][j] < deepest / std::f64::consts::E);
-        SPACING * (beyond.unwrap() - middle) as f64
+        let forces = self.forces([0.0, DEPTH], &[0.0; NODES]);
+        let shared = |way: f64| -> f64 {
+            let pairs =
+                self.points.iter().zip(&forces).flat_map(|a| self.points.iter().zip(&forces).map(move |b| (a, b)));
+            pairs.map(|(([a, _], f), ([b, _], g))| f * g * self.between(*a, b + way)).sum()
+        };
+        let whole = shared(0.0);
+        let ways = (0..).map(|step| 0.1 * SPACING * f64::from(step));
+        ways.into_iter().find(|way| shared(*way) < whole / std::f64::consts::E).unwrap()
+    }
+
+    /// The membrane's compliance between two places (m/N).
+    fn between(&self, a: f64, b: f64) -> f64 {
+        let (node, weights) = Self::at(a);
+        (0..2).map(|k| weights[k] * Self::mean(&self.compliance[node + k], b)).sum()
     }
 
     /// Node before a place, and weights of it and the next.
@@ -98,10 +111,7 @@ impl Membrane {
             .zip(&places)
             .map(|([_, height], place)| press - height - Self::mean(d, *place))
             .collect();
-        let compliance = |a: usize, b: usize| {
-            let (node, weights) = Self::at(places[a]);
-            (0..2).map(|k| weights[k] * Self::mean(&self.compliance[node + k], places[b])).sum::<f64>()
-        };
+        let compliance = |a: usize, b: usize| self.between(places[a], places[b]);
         let count = places.len();
         for set in (0..1_usize << count).rev() {
             let pushing: Vec<usize> = (0..count).filter(|i| set >> i & 1 == 1).collect();
@@ -244,28 +254,27 @@ fn press(t: f64) -> f64 {
 
 #[test]
 fn a_press_a_hold_and_a_release_are_those_of_the_membrane_with_its_history() {
-    for (name, kind, points, bound) in [
-        ("one finger on a skin", SKIN, &[[0.0, 0.0]][..], 0.02),
-        ("one finger on a sheet", SHEET, &[[0.0, 0.0]], 0.02),
-        ("two far apart on a skin, one 3 mm above the other", SKIN, &[[-0.03, 0.0], [0.03, 0.003]], 0.02),
-        ("three side by side on a skin, the middle one lowest", SKIN, &THREE, 0.02),
-        ("three side by side on a sheet, the middle one lowest", SHEET, &THREE, 0.02),
+    for (name, kind, points) in [
+        ("one finger on a skin", SKIN, &[[0.0, 0.0]][..]),
+        ("one finger on a sheet", SHEET, &[[0.0, 0.0]]),
+        ("two far apart on a skin, one 3 mm above the other", SKIN, &[[-0.03, 0.0], [0.03, 0.003]]),
+        ("three side by side on a skin, the middle one lowest", SKIN, &THREE),
+        ("three side by side on a sheet, the middle one lowest", SHEET, &THREE),
     ] {
         let membrane = Membrane::new(kind, points);
         let [error, _] = membrane.compared(2.4, 0.0, |t| [0.0, press(t)]);
         println!("{name}: press, hold, release err by {:.2} % rms", 100.0 * error);
-        assert!(error < bound, "{name}: {error}");
+        assert!(error < 0.02, "{name}: {error}");
     }
 }
 
 #[test]
 fn scrapes_are_those_of_the_membrane_with_its_history() {
-    for (name, kind, points, bound) in [
-        ("one finger on a skin", SKIN, &[[0.0, 0.0]][..], 0.07),
-        ("one finger on a sheet", SHEET, &[[0.0, 0.0]], 0.07),
-        ("three side by side on a skin", SKIN, &THREE, 0.07),
-        // Fingers spread wider than a dent forget more slowly.
-        ("three side by side on a sheet", SHEET, &THREE, 0.2),
+    for (name, kind, points) in [
+        ("one finger on a skin", SKIN, &[[0.0, 0.0]][..]),
+        ("one finger on a sheet", SHEET, &[[0.0, 0.0]]),
+        ("three side by side on a skin", SKIN, &THREE),
+        ("three side by side on a sheet", SHEET, &THREE),
     ] {
         let membrane = Membrane::new(kind, points);
         for speed in [0.5, 2.0, 8.0, 32.0] {
@@ -279,7 +288,7 @@ fn scrapes_are_those_of_the_membrane_with_its_history() {
                  the membrane's",
                 100.0 * error
             );
-            assert!(error < bound, "{name}, {speed}: {error}");
+            assert!(error < 0.07, "{name}, {speed}: {error}");
         }
     }
 }

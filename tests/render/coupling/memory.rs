@@ -2,13 +2,11 @@
 
 use super::block::{STIFFNESS, block, felt, scene, setup};
 use haptize::{
-    JointMatrix, JointVector,
-    dataset::SlipColumns,
+    JointVector,
     fixtures::{
         Random,
-        worlds::{BUMP_RADIUS, BUMP_STIFFNESS, bump, half_space},
+        worlds::{BUMP_RADIUS, BUMP_STIFFNESS, bump},
     },
-    joint_matrix::lower,
     render::{haptic::Inputs, setup::Setup},
     scene::Rendering,
 };
@@ -110,55 +108,6 @@ fn random_ticks_with_memory_give_nothing() {
         }
         let accounts = before.unwrap();
         assert!(accounts.relaxed > 1e-4, "seed {seed}: {} J", accounts.relaxed);
-    }
-}
-
-/// The same over one to six joints, with friction, too, at speeds near those at which the device is taken for faulty.
-#[test]
-fn random_ticks_of_one_to_six_joints_give_nothing() {
-    for joints in 1..=6 {
-        let mut random = Random::new(joints as u64);
-        let mut of = |least: f64, greatest: f64| least * (greatest / least).powf(random.between(0.0, 1.0));
-        let (share, times, mu) = (of(0.1, 0.45), [of(2e-3, 10.0), of(2e-3, 10.0)], of(0.05, 2.0));
-        let mut data = half_space(
-            joints,
-            &format!(
-                "[haptics]\ninterpolation = \"potential\"\n[haptics.friction]\ncoefficient = {mu}\nstiffness = 5.0\n\
-                 [object.relaxation]\nterms = [[{share}, {}], [{share}, {}]]\ndent = 0.1\n",
-                times[0], times[1]
-            ),
-        );
-        let force = |point: usize| data.torque(point).iter().map(|tau| tau * tau).sum::<f64>().sqrt() as f32;
-        let mut unit = JointMatrix::default();
-        (0..joints).for_each(|k| unit[k][k] = 1.0);
-        let points = data.grid.points();
-        data.slip = Some(SlipColumns {
-            normal_force: (0..points).map(force).collect::<Vec<_>>().into(),
-            jacobian: lower(&unit, joints).map(|entry| entry as f32).collect::<Vec<_>>().repeat(points).into(),
-        });
-        let haptics = Setup::new(&data).unwrap().haptics;
-        let mut position = JointVector::zeros(joints);
-        let mut state = haptics.start(&position).unwrap();
-        let (mut before, mut elapsed) = ([0.0; 2], 1e-3);
-        for k in 0..TICKS / 6 {
-            let interval = if k % 7 == 0 { 1e-3 * random.between(0.1, 1.0) } else { 1e-3 };
-            let speed = if k % 500 > 400 { 0.0 } else { 4.0 };
-            for q in position.iter_mut() {
-                *q = (*q + speed * elapsed * random.between(-1.0, 1.0)).clamp(-0.3, 0.5);
-            }
-            let output = haptics.tick(&mut state, &Inputs { position, age: 0.0, elapsed, interval });
-            let now = output.accounts;
-            let rounding = 1e-12 * now.exchanged;
-            assert!(output.fault.is_none() && now.residual().abs() <= rounding, "{joints} joints, {k}: {output:?}");
-            let taken = [now.relaxed, now.friction_dissipation];
-            assert!(
-                (0..2).all(|a| taken[a] >= before[a] - rounding),
-                "{joints} joints, {k}: {taken:?} after {before:?}"
-            );
-            assert!(now.leak <= now.proxy_dissipation + rounding, "{joints} joints, tick {k}: {now:?}");
-            (before, elapsed) = (taken, interval);
-        }
-        assert!(before.iter().all(|taken| *taken > 1e-4), "{joints} joints: {before:?} J");
     }
 }
 

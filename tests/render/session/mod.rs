@@ -2,6 +2,7 @@
 
 mod accounts;
 mod live;
+mod memory;
 mod object;
 mod press;
 mod range;

@@ -5,5 +5,6 @@ mod fixture;
 mod interpolation;
 mod lowest;
 mod publication;
+mod random_ticks;
 mod refine;
 mod world;

@@ -2,7 +2,7 @@
 
 use super::{Random, Target, mutate, outcome, shipped, write};
 use haptize::{
-    gridize::{GridizeOptions, Interpolation, Samples, gridize},
+    gridize::{GridizeOptions, Interpolation, Samples, WITHIN, gridize},
     logs::{Effort, Mapping, import},
     ros::{JointState, JointStateTable, topics},
     scan::ScanLog,
@@ -63,6 +63,7 @@ fn gridized(samples: &Samples) -> String {
         epsilon: None,
         interpolation: if joints == 2 { Interpolation::Natural } else { Interpolation::Linear },
         smooth: true,
+        within: WITHIN,
     };
     outcome(gridize(samples, &options))
 }
