@@ -15,7 +15,7 @@ use haptize::{
     gpu::{AdapterChoice, Context, FrameUpdate, GpuSolver, KernelTime},
     object::Object,
     proxy::Chain,
-    scene::{ContactLaw, GraphicsEffects, Scene, Shape},
+    scene::{ContactLaw, Scene, Shape},
     sweep::{Backend, BackendChoice, Bake, CpuBackend, build_object, sample},
 };
 use std::{

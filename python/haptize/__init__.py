@@ -9,6 +9,7 @@ A scene is haptized into a dataset, a field looks torques up in it, a loop rende
 All quantities are SI: m, rad, N, N m, kg, s, J.
 """
 
+from . import _pickle  # noqa: F401
 from ._haptize import (
     BakeError,
     Dataset,
@@ -26,6 +27,7 @@ from ._haptize import (
     gridize,
     solve,
 )
+from .commands import run
 from .figures import plot
 
 __all__ = [
@@ -44,5 +46,6 @@ __all__ = [
     "bake",
     "gridize",
     "plot",
+    "run",
     "solve",
 ]

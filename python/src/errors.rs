@@ -3,7 +3,7 @@
 use haptize::{Error as Failure, ErrorKind};
 use pyo3::{
     create_exception,
-    exceptions::{PyException, PyValueError},
+    exceptions::{PyException, PyFileNotFoundError, PyValueError},
     prelude::*,
 };
 use std::path::Path;
@@ -24,6 +24,9 @@ create_exception!(
 create_exception!(haptize, BakeError, Error, "A scene cannot be haptized, or its object not be built.");
 create_exception!(haptize, GridizeError, Error, "Measurements cannot be put on a grid.");
 
+/// POSIX's ENOENT, which Windows has, too.
+const NO_ENTRY: i32 = 2;
+
 /// Adds the exceptions to `module`.
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
@@ -34,9 +37,20 @@ pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("GridizeError", py.get_type::<GridizeError>())
 }
 
-/// A [`SceneError`].
+/// Python's own error of a file that is not there, or of a folder to write one to.
+fn not_found(error: &Failure) -> Option<PyErr> {
+    let at = error.location().filter(|at| error.kind() == ErrorKind::File && !at.path.exists())?;
+    let text = error.to_string();
+    let text = text.strip_prefix(&format!("{}: ", at.path.display())).unwrap_or(&text).to_owned();
+    Some(PyFileNotFoundError::new_err((NO_ENTRY, text, at.path.as_os_str().to_owned())))
+}
+
+/// A [`SceneError`], or FileNotFoundError.
 pub fn scene(py: Python<'_>, error: impl Into<Failure>) -> PyErr {
     let error = error.into();
+    if let Some(missing) = not_found(&error) {
+        return missing;
+    }
     let (path, place) = error.location().map_or((None, None), |at| (Some(&at.path), at.line));
     let raised = SceneError::new_err(error.to_string());
     let value = raised.value(py);
@@ -47,8 +61,11 @@ pub fn scene(py: Python<'_>, error: impl Into<Failure>) -> PyErr {
     told.err().unwrap_or(raised)
 }
 
-/// A [`DatasetError`], or a [`SceneError`] where the scene in the dataset is not valid.
+/// A [`DatasetError`], a [`SceneError`] where the scene in the dataset is not valid, or FileNotFoundError.
 pub fn dataset(py: Python<'_>, error: &Failure) -> PyErr {
+    if let Some(missing) = not_found(error) {
+        return missing;
+    }
     match error.kind() {
         ErrorKind::Scene => scene(py, error.clone()),
         _ => with_path(py, error.to_string(), error.location().map(|at| at.path.as_path())),
@@ -64,6 +81,12 @@ fn with_path(py: Python<'_>, message: String, path: Option<&Path>) -> PyErr {
 /// The dataset has no `column`.
 pub fn absent(py: Python<'_>, column: &str) -> PyErr {
     with_path(py, format!("the dataset holds no {column}, as datasets of real objects do not"), None)
+}
+
+/// The dataset is refined where a uniform grid is needed.
+pub fn refined(py: Python<'_>) -> PyErr {
+    let message = "the dataset is refined, and array look-ups take a uniform grid: bake the scene without --refine";
+    with_path(py, message.into(), None)
 }
 
 pub fn bake(error: &Failure) -> PyErr {

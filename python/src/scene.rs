@@ -7,7 +7,7 @@ use pyo3::{
     prelude::*,
     types::{PyDict, PyString},
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A scene: what is haptized, with what, how finely, and how it is felt. datasets/README.md explains every key.
 ///
@@ -51,6 +51,12 @@ impl Scene {
     #[getter]
     fn text(&self) -> &str {
         &self.scene.text
+    }
+
+    /// Path of the file that messages name; files that the scene names are relative to its folder.
+    #[getter]
+    fn path(&self) -> &Path {
+        &self.scene.path
     }
 
     /// Names of the joints.

@@ -80,6 +80,42 @@ def test_outside_the_grid_is_told(field):
     assert np.array_equal(field.gradient([1e300, -1e300]), np.zeros((2, 2)))
 
 
+def test_outside_the_grid_is_refused_or_filled_where_it_is_asked_for(dataset, field):
+    strict = haptize.Field(dataset, bounds_error=True)
+    filled = haptize.Field(dataset, fill_value=np.nan)
+    beyond = np.array([PRESSED, [5.0, 0.02], [-0.3, 0.01], [0.0, 0.0099]])
+    for name in ("torque", "energy", "gap", "gradient"):
+        with pytest.raises(ValueError, match="configuration 1 is outside"):
+            getattr(strict, name)(beyond)
+        with pytest.raises(ValueError, match="configuration 0 is outside"):
+            getattr(strict, name)(beyond[3])
+        for row, inside in enumerate([True, False, True, False]):
+            for found in (getattr(filled, name)(beyond)[row], getattr(filled, name)(beyond[row])):
+                expected = getattr(field, name)(beyond[row])
+                assert np.array_equal(found, expected) if inside else np.isnan(found).all(), (name, row)
+        assert np.array_equal(getattr(strict, name)(beyond[::2]), getattr(field, name)(beyond[::2]))
+    assert filled.torque(np.empty((0, 2))).shape == (0, 2)
+    assert (strict.bounds_error, strict.fill_value, strict.interpolation) == (True, None, None)
+
+
+def test_forces_and_shape_at_a_grid_point_are_those_of_the_equilibrium(scene, dataset):
+    field = haptize.Field(dataset, "potential")
+    # The deepest grid point.
+    point = np.unravel_index(dataset.energy.argmax(), dataset.shape)
+    q = np.array([line[k] for line, k in zip(dataset.lines, point)])
+    found = haptize.solve(scene, q)
+    forces, displacement = field.forces(q), field.displacement(q)
+    # Stored forces have seven digits.
+    assert forces.shape == found.forces.shape and np.abs(forces).max() > 0.1
+    assert np.abs(forces - found.forces).max() < 1e-5 * np.abs(found.forces).max()
+    assert np.abs(displacement - found.displacement).max() < 1e-5 * np.abs(found.displacement).max()
+    many = field.forces(np.array([q, [0.0, 0.01]]))
+    assert many.shape == (2, *forces.shape) and np.array_equal(many[0], forces) and not many[1].any()
+    measured = haptize.Field(haptize.gridize(np.array([[0.0], [1.0]]), np.zeros((2, 1)), 0.5))
+    with pytest.raises(haptize.Error):
+        measured.forces([0.5])
+
+
 @pytest.mark.parametrize(
     "q, error",
     [

@@ -45,9 +45,6 @@ def test_an_error_names_file_and_line(tmp_path):
     assert str(raised.value.path) == str(path)
     assert raised.value.line == 5 and raised.value.column > 1
     assert "wrong.toml:5:" in str(raised.value)
-    with pytest.raises(haptize.SceneError) as raised:
-        haptize.Scene.load(tmp_path / "none.toml")
-    assert raised.value.line is None
     assert isinstance(raised.value, haptize.Error)
 
 

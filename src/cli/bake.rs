@@ -43,8 +43,8 @@ pub struct Arguments {
     /// The backend that solves contact.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
-    /// The law of contact, instead of the scene's: depths and directions before the surface at rest, or before
-    /// the deformed one.
+    /// The law of contact, instead of the scene's: depth is measured from the undeformed surface (rest) or from the
+    /// deformed one (following).
     #[arg(long)]
     law: Option<ContactLaw>,
     /// Continue a bake that was interrupted. What was solved is kept; the search for lower equilibria and the
@@ -59,8 +59,8 @@ pub struct Arguments {
     /// fraction of the torque's own rms over the grid (0.01 or 1%), or a torque ("0.002 N m").
     #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
     max_error: Option<Aim>,
-    /// Instead of choosing a uniform grid for --max-error, refine the scene's grid where it errs: by up to so many
-    /// levels, itself included, each of half the spacing.
+    /// Instead of choosing a uniform grid for --max-error, refine the scene's grid where it errs, with up to so many
+    /// levels: the scene's grid is the first, and each further one halves the spacing.
     #[arg(long, value_name = "LEVELS", requires = "max_error",
         conflicts_with_all = ["resume", "law", "shard"],
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_LEVELS)))]
@@ -68,7 +68,7 @@ pub struct Arguments {
     /// Maximum number of grid points that --max-error may choose.
     #[arg(long, default_value_t = 2_000_000, value_name = "POINTS")]
     max_points: usize,
-    /// Take it for success that the arm touches the object at no grid point.
+    /// Do not fail if the arm touches the object at no grid point.
     #[arg(long)]
     allow_free: bool,
     /// Solve one of N shards, counted from 0, into a file of its own: "3/64"; "auto/64" takes the number from the

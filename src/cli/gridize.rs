@@ -69,14 +69,14 @@ pub struct Arguments {
     #[arg(long)]
     topic: Option<String>,
     /// Meaning of the efforts of an MCAP file, without --columns: the torque of the motors, or that of the contact on
-    /// the arm. They must hold no weight of the arm.
+    /// the arm. The arm's weight must have been subtracted.
     #[arg(long, default_value = "motor", conflicts_with = "columns")]
     effort: Effort,
     /// A scene with the arm and the gains to feel the dataset with; scan logs bring theirs.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Torque above which a configuration counts as contact (N m); by default what the scan's scene says, three
-    /// standard deviations of the samples, or a hundredth of the greatest torque.
+    /// Torque above which a configuration counts as contact (N m). By default that of the scan's scene; without one three
+    /// standard deviations of the samples, where these are known; else a hundredth of the greatest torque.
     #[arg(long, allow_negative_numbers = true)]
     epsilon: Option<f64>,
     /// How torques are interpolated.
@@ -89,8 +89,8 @@ pub struct Arguments {
     /// `inf` for the hull alone.
     #[arg(long, default_value_t = WITHIN, value_name = "SPACINGS", allow_negative_numbers = true)]
     within: f64,
-    /// Measure how well the dataset predicts measurements: this fraction of the samples is left out of a second one,
-    /// which has to predict them.
+    /// Measure how well the dataset predicts measurements: a second one is made without this fraction of the samples, and
+    /// its errors there are stated.
     #[arg(long, value_name = "FRACTION", allow_negative_numbers = true, value_parser = super::fraction)]
     held_out: Option<f64>,
     /// Measure how well the dataset predicts other logs of the same object.
@@ -465,10 +465,13 @@ impl Describe for IdentifiedFriction {
         text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes{builds_up}"));
         for (joint, [with, without]) in predicted.iter().enumerate() {
             let joint = joint + 1;
+            let left_out = if with < without { "" } else { ": it has none" };
             text.row(
                 "",
                 format_args!(
-                    "joint {joint}: held-out strokes predicted to {with:.4} rms, without friction to {without:.4}"
+                    "joint {joint}: held-out strokes predicted to {} rms, without friction to {}{left_out}",
+                    coarse(*with),
+                    coarse(*without)
                 ),
             );
         }
@@ -504,7 +507,7 @@ impl Describe for Gridized {
                 ),
             );
         }
-        text.row("in contact", format_args!("{contact_points} points, torque above {epsilon:.4} {unit}"));
+        text.row("in contact", format_args!("{contact_points} points, torque above {} {unit}", coarse(*epsilon)));
         if *left_out > 0 {
             text.row("left out", watch::counted(*left_out, ["row", "rows"]));
         }
@@ -520,9 +523,10 @@ impl Describe for Gridized {
                 self.axes.iter().zip(cells.hysteresis.iter().zip(&cells.repeatability))
             {
                 let unit = axis.effort_unit();
+                let [hysteresis, repeatability] = [hysteresis, repeatability].map(|x| coarse(*x));
                 text.row(
                     &axis.name,
-                    format_args!("hysteresis +-{hysteresis:.4} {unit}, repeatability {repeatability:.4} {unit}"),
+                    format_args!("hysteresis +-{hysteresis} {unit}, repeatability {repeatability} {unit}"),
                 );
             }
         }
@@ -530,11 +534,12 @@ impl Describe for Gridized {
             let Some(Prediction { samples, predicted, rms, worst, deviation }) = prediction else { continue };
             text.row(what, format_args!("{samples} samples, {predicted} of them inside the grid and predicted"));
             for (joint, axis) in self.axes.iter().enumerate().filter(|_| *predicted > 0) {
-                let own = deviation.as_ref().map(|own| format!("; their own standard deviation {:.4}", own[joint]));
-                let repeated = cells.map(|cells| format!(", repeatability {:.4}", cells.repeatability[joint]));
+                let own =
+                    deviation.as_ref().map(|own| format!("; their own standard deviation {}", coarse(own[joint])));
+                let repeated = cells.map(|cells| format!(", repeatability {}", coarse(cells.repeatability[joint])));
                 let beside: String = own.into_iter().chain(repeated).collect();
-                let (rms, worst, unit) = (rms[joint], worst[joint], axis.effort_unit());
-                text.row(&axis.name, format_args!("to {rms:.4} {unit} rms, {worst:.4} at worst{beside}"));
+                let (rms, worst, unit) = (coarse(rms[joint]), coarse(worst[joint]), axis.effort_unit());
+                text.row(&axis.name, format_args!("to {rms} {unit} rms, {worst} at worst{beside}"));
             }
         }
         self.relaxation.describe(text);

@@ -34,6 +34,7 @@ impl Describe for Guessed {
         text.line(format_args!("wrote {}; check:", self.file));
         self.doubts.iter().for_each(|doubt| text.line(format_args!("  - {doubt}")));
         text.line(format_args!("next: {}", self.next));
+        text.line("      with --scene ARM.toml, a scene with the joints of the log, it can be played, too");
     }
 }
 

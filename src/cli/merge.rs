@@ -31,7 +31,7 @@ pub struct Arguments {
     /// the points in contact, at least 100 and at most 1000.
     #[arg(long, value_name = "COUNT", value_parser = watch::configurations())]
     measure_error: Option<usize>,
-    /// Take it for success that the arm touches the object at no grid point.
+    /// Do not fail if the arm touches the object at no grid point.
     #[arg(long)]
     allow_free: bool,
 }

@@ -16,7 +16,7 @@
 /// Which adapter draws and computes, for the help of commands that use one.
 macro_rules! adapter_help {
     () => {
-        "\n\nWith several GPUs the first that `haptize doctor` lists draws, and all of the best kind solve. Set \
+        "\n\nWith several GPUs the first that `haptize doctor` lists draws, and all of the fastest kind solve. Set \
          WGPU_ADAPTER_NAME to parts of their names or to their addresses, with commas between, to choose others: \
          \"RTX 4090\", \"01:00.0,02:00.0\"."
     };
@@ -96,10 +96,10 @@ struct CommandLine {
     /// Print one machine-readable JSON object on standard output.
     #[arg(long, global = true)]
     json: bool,
-    /// Replace files that haptize did not write, too.
+    /// Replace existing files even if haptize did not write them.
     #[arg(long, global = true)]
     force: bool,
-    /// Neither use nor keep what earlier commands computed of the same body.
+    /// Ignore what earlier commands kept of the same body, and keep nothing.
     #[arg(long, global = true)]
     no_cache: bool,
 }
@@ -123,7 +123,7 @@ macro_rules! commands {
 }
 
 commands! {
-    /// Measure what accuracy costs in time: error against spacing, interpolation, tolerance and more, with figures.
+    /// Measure error and computing time for many grids, interpolations and tolerances, with figures.
     Accuracy: accuracy;
     /// Solve contact at every point of a scene's grid and write the dataset.
     Bake: bake;
@@ -145,15 +145,15 @@ commands! {
     Inspect: inspect;
     /// Write the manual pages.
     Man: man;
-    /// Put the shards of a bake together into its dataset.
+    /// Join the shards of a bake into one dataset.
     Merge: merge;
     /// Write a commented scene to begin with.
     New: new;
-    /// Remake the figures and numbers of the paper, with a table that compares them.
+    /// Remake the figures and numbers of the paper, and compare them with the published ones.
     Paper: paper;
     /// Put the tip of an arm before an object, and find a grid and a press there.
     Place: place;
-    /// State what the shards of a bake take, with lines for job schedulers.
+    /// Estimate time and memory of each shard of a bake, with lines for job schedulers.
     Plan: plan;
     /// Feel a dataset with a simulated hand or a real device: traces and figures.
     Play: play;
@@ -163,7 +163,7 @@ commands! {
     Scan: scan;
     /// Find the surface of a scanned object from the log of its scan.
     Shape: shape;
-    /// Make a scene of what was scanned: an elastic object that explains the log of its scan.
+    /// Make a scene of what was scanned: an elastic object that answers with the torques of the log.
     Twin: twin;
     /// Open a dataset or a scene in a window.
     View: view;

@@ -46,13 +46,13 @@ fn misplaced(text: &str) -> Result<String, String> {
 /// A scene that is part of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Example {
-    /// A sphere with a skin under an arm of three joints: converges with mesh, contact nodes and grid.
+    /// A sphere with a skin under an arm of three joints: the result settles as mesh, contact nodes and grid get finer.
     Sphere,
     /// The paper's sphere of 102 nodes joined by springs.
     Paper,
     /// A triangle mesh from a file under an arm of four joints, one of them prismatic.
     Mesh,
-    /// A soft organ under a hooked probe that six joints lead, solved while it is felt.
+    /// A soft organ under a hooked probe on six joints, whose contact is solved live.
     Organ,
     /// A soft ball within reach of the 3D Systems Touch (Phantom Omni).
     Touch,

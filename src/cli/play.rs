@@ -49,7 +49,7 @@ Examples:
   haptize play sphere.haptize --replay session.csv
   haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
 pub struct Arguments {
-    /// A dataset, or a scene: contact is then solved in every tick, before the surface at rest, and nothing is baked.
+    /// A dataset, or a scene: contact is then solved live, in every tick, by the law `rest`, and nothing is baked.
     dataset: PathBuf,
     /// Motion of the hand: `press` or `scrape` as in the scene, a CSV file of times (s) and joint coordinates, or joint
     /// states in MCAP, such as a session that --record wrote.
@@ -83,7 +83,7 @@ pub struct Arguments {
     #[arg(long)]
     realtime: bool,
     /// Record the session into this file: all inputs of the loop and all its outputs. A name that ends in .mcap gives
-    /// joint states in MCAP, for other programs and for --motion; only the table that other names give can be replayed.
+    /// joint states in MCAP, for other programs and for --motion; any other gives a table, which alone can be replayed.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay the session in this file and check that it matches bit for bit.
@@ -162,6 +162,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         felt.beside(beside, played.trace.summary().seconds)?;
         let drawn = felt.draw(&folder, &played.trace)?;
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
+    }
+    if live.is_some() && !trace.ticks.iter().any(|tick| tick.sample.contact) {
+        let what =
+            "the arm never met the object; `haptize place SCENE` says how far it is, and makes a motion that presses";
+        tell(format_args!("haptize: nothing touches: {what}"));
     }
     let tally = tally(trace);
     let summary = trace.summary();
@@ -384,7 +389,9 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Stri
 fn folder(arguments: &Arguments) -> PathBuf {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let felt = arguments.replay.as_deref().unwrap_or(Path::new(&arguments.motion));
-    let named = || Path::new("out").join(format!("{}-{}", stem(&arguments.dataset), stem(felt)));
+    // Beside what a dataset of the same name gave, not in its place.
+    let live = if Scene::is_at(&arguments.dataset) { "-live" } else { "" };
+    let named = || Path::new("out").join(format!("{}{live}-{}", stem(&arguments.dataset), stem(felt)));
     arguments.output.clone().unwrap_or_else(named)
 }
 

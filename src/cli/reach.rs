@@ -25,7 +25,7 @@ Examples:
 pub struct Arguments {
     /// The scene. Its grid, if it has one, does not matter.
     scene: PathBuf,
-    /// Depth up to which the grid is to hold contact (m); by default a fifth of the body's size.
+    /// Deepest contact that the grid is to cover (m); by default a fifth of the body's size.
     #[arg(long, value_name = "METRES", value_parser = depth)]
     depth: Option<f64>,
     /// Rms error of the torque that the grid is for: a fraction of the torque's own rms over the grid, or a torque
@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Maximum number of points of the grid.
     #[arg(long, default_value_t = POINTS, value_name = "POINTS")]
     max_points: usize,
-    /// The backend that solves the pilot.
+    /// What solves the trial grids.
     #[arg(long, default_value = "auto")]
     backend: BackendChoice,
     /// Write the grid into the scene, in the place of one that is there. Comments stay.

@@ -35,7 +35,7 @@ Examples:
   haptize scan sponge.toml --resume
   haptize scan sponge.toml --guided 60")]
 pub struct Arguments {
-    /// The scene's file; its `[scan]` says where the device goes.
+    /// A scene with a table `[scan]`, which says where the device goes.
     scene: PathBuf,
     /// The log to write; by default the scene's name in the current folder, ending in .csv.
     #[arg(short, long)]
@@ -44,15 +44,15 @@ pub struct Arguments {
     #[arg(long)]
     resume: bool,
     /// Scan with a real device instead of the simulated rig: KIND or KIND:PLACE, as `haptize device list` shows it. It
-    /// must measure and drive its joints. With --guided the space bar says that a hand holds it.
+    /// must measure and drive its joints. With --guided, hold the space bar while you move it.
     #[arg(long, value_name = "NAME", conflicts_with = "plan_out")]
     device: Option<Address>,
     /// Only write the plan as a trajectory, as CSV or, where the name ends in .mcap, as joint states in MCAP: for a
     /// robot that its own controller moves. Its log comes back by `haptize gridize`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "resume", "guided"])]
     plan_out: Option<PathBuf>,
-    /// How long the trajectory of --plan-out rests at each point (s); by default the scan's window and time of
-    /// averaging.
+    /// How long the trajectory of --plan-out rests at each point (s); by default `window` and `average` of the
+    /// scan's control together.
     #[arg(long, requires = "plan_out", allow_negative_numbers = true)]
     dwell: Option<f64>,
     /// Instead of going through the plan, log for so many seconds wherever a hand leads the device to and lets go of

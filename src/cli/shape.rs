@@ -28,7 +28,8 @@ Examples:
 pub struct Arguments {
     /// A log written by `haptize scan`.
     log: PathBuf,
-    /// Height of the ground on which the object lies (m); by default a spacing below the lowest place that was reached.
+    /// Height of the ground on which the object lies (m); by default one distance between approaches below
+    /// the lowest place that was reached.
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
     ground: Option<f64>,
     /// The OBJ file to write; by default the log's name in the current folder, ending in .obj. A picture of the same

@@ -30,11 +30,12 @@ Examples:
 pub struct Arguments {
     /// A log written by `haptize scan`.
     log: PathBuf,
-    /// Height of the ground on which the object lies (m); by default a spacing below the lowest place that was reached.
+    /// Height of the ground on which the object lies (m); by default one distance between approaches below
+    /// the lowest place that was reached.
     #[arg(long, value_name = "Z", allow_negative_numbers = true)]
     ground: Option<f64>,
-    /// Width over which the dent of a point is rounded (m); by default three edges of the surface. The wider, the softer
-    /// is the object that explains the scan.
+    /// Width over which the dent of a point is rounded (m); by default three edges of the surface. A larger one
+    /// makes the object softer.
     #[arg(long, value_name = "W", value_parser = length, allow_negative_numbers = true)]
     width: Option<f64>,
     /// The scene to write, which must not be there yet; by default the log's name in the current folder, ending in

@@ -26,7 +26,7 @@ Examples:
     adapter_help!()
 ))]
 pub struct Arguments {
-    /// A dataset, or a scene, whose contact is solved in every tick, before the surface at rest; without one the paper's
+    /// A dataset, or a scene, whose contact is solved live, in every tick, by the law `rest`; without one the example
     /// sphere, which is baked first.
     file: Option<PathBuf>,
     /// A real device leads the arm instead of the pointer: KIND or KIND:PLACE, as `haptize device list` shows it.
@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Torque only while the space bar is held in the window (a dead-man key).
     #[arg(long, requires = "device")]
     hold_key: bool,
-    /// Write the window to this PNG file instead of opening it: needs no display, but some Vulkan, software too.
+    /// Write the window to this PNG file instead of opening it: needs a Vulkan driver, of which a software one will do, and no display.
     #[arg(long, value_name = "PNG")]
     screenshot: Option<PathBuf>,
     /// Write the 3-D picture over the motion to this file, whose name ends in .gif, or as PNG files into this new folder.

@@ -42,7 +42,8 @@ pub fn watched<T, E: Into<Failure>>(
 const FREE: &str = "nothing touches: at none of the grid's points does the arm meet the object";
 
 /// Says where contact is to be looked for.
-const REMEDY: &str = "`haptize reach SCENE` prints a grid over the contact within the joint limits";
+const REMEDY: &str = "`haptize place SCENE --move --write` moves the object before the arm and makes a grid there; \
+                      `haptize reach SCENE` prints a grid over contact that the joints reach as it is";
 
 /// Warns of `dataset` if arm and object touch at no grid point, and returns their least gap.
 pub fn warn_of_free_space(dataset: &Dataset) -> Result<Option<Clearance>, Failure> {

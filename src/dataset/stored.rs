@@ -138,8 +138,8 @@ const DESCRIPTIONS: [Description; 18] = [
     of(ContactForces, "contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")).with(Extra::Forces),
     of(SurfaceNodes, "surface_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")).or_absent("the object's surface"),
     of(SurfaceTriangles, "surface_triangles", Dtype::U32, Axes::Own(&[("triangle", 0), ("corner", 3)]), Unit::Of("1")),
-    of(InnerNodes, "inner_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")),
-    of(Tetrahedra, "tetrahedra", Dtype::U32, Axes::Own(&[("tetrahedron", 0), ("corner", 4)]), Unit::Of("1")),
+    of(InnerNodes, "inner_nodes", Dtype::F64, Axes::Own(&[("inner node", 0), ("xyz", 3)]), Unit::Of("m")),
+    of(Tetrahedra, "tetrahedra", Dtype::U32, Axes::Own(&[("tetrahedron", 0), ("vertex", 4)]), Unit::Of("1")),
     of(MidNodes, "mid_nodes", Dtype::U32, Axes::Own(&[("tetrahedron", 0), ("edge", 6)]), Unit::Of("1")),
     of(Regions, "regions", Dtype::U32, Axes::Own(&[("tetrahedron", 0)]), Unit::Of("1")),
 ];

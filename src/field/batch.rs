@@ -49,20 +49,21 @@ pub fn fill_rows<T: Send>(
         return Err(other_length("results", found, expected, [rows, joints]));
     }
     if width > 0 {
-        fill((configurations, joints), (out, width), &write);
+        let write_all = |q: &[f64], out: &mut [T]| {
+            q.chunks_exact(joints).zip(out.chunks_exact_mut(width)).for_each(|(q, out)| write(q, out))
+        };
+        fill((configurations, joints), (out, width), &write_all);
     }
     Ok(())
 }
 
-/// Fills whole rows.
+/// Fills whole rows, shares of them by `write`.
 fn fill<T: Send>(
     (configurations, joints): (&[f64], usize),
     (out, width): (&mut [T], usize),
     write: &(impl Fn(&[f64], &mut [T]) + Sync),
 ) {
-    let share = |(q, out): (&[f64], &mut [T])| {
-        q.chunks_exact(joints).zip(out.chunks_exact_mut(width)).for_each(|(q, out)| write(q, out));
-    };
+    let share = |(q, out): (&[f64], &mut [T])| write(q, out);
     if configurations.len() <= SHARE * joints {
         share((configurations, out));
     } else {
@@ -93,9 +94,8 @@ impl TorqueField {
             }
         }
         let Some(statuses) = statuses else {
-            return fill_rows(configurations, joints, torques, |q, torque| {
-                torque.copy_from_slice(&self.sample(q).torque)
-            });
+            fill((configurations, joints), (torques, joints), &|q, torques| self.interpolant.torques(q, torques));
+            return Ok(());
         };
         let rows = configurations.par_chunks_exact(joints).zip(torques.par_chunks_exact_mut(joints)).zip(statuses);
         rows.with_min_len(SHARE).for_each(|((q, torque), status)| {

@@ -59,6 +59,11 @@ impl BoundaryLayer {
         Self { compliance, density: density.sqrt() }
     }
 
+    /// 1 / Ks, joint by joint (rad/(N m)).
+    pub(super) fn compliance(&self) -> JointVector {
+        self.compliance
+    }
+
     /// `|torque|_K` (sqrt(J)).
     #[must_use]
     pub fn size(&self, torque: &[f64]) -> f64 {

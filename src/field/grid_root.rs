@@ -175,4 +175,8 @@ impl RootNodes for GridRoot {
         let fade = self.grid.fade(q);
         with_joints!(self.grid.joints(), D => self.around_in::<{ 1 << D }, { width(D) }>(fade, cell, root))
     }
+
+    fn records(&self) -> Option<&[f64]> {
+        Some(&self.records)
+    }
 }

@@ -9,14 +9,15 @@
 //! object where the measurements do: it keeps the value that it has there.
 
 use super::{
-    Flags, Interpolant, Sample,
+    Flags, Interpolant, Sample, Tables,
     boundary::BoundaryLayer,
+    grid_root::corners,
     points::{Around, Checked, Point},
 };
 use crate::{
     Error, JointVector,
-    dataset::{Axis, Grid, Stencil},
-    store::with_joints,
+    dataset::{Axis, Grid},
+    store::{Cell, with_joints},
 };
 
 /// Interleaved point by point, so that a corner is one stretch of memory.
@@ -66,11 +67,11 @@ impl Linear {
         sizes.fold(0.0, f64::max)
     }
 
-    /// The field in the cell of `stencil`.
-    fn at<const D: usize>(&self, stencil: &Stencil) -> Interpolated {
+    /// The field between the `points` at the corners of a cell. `C = 2^D`.
+    fn at<const D: usize, const C: usize>(&self, points: &[usize; C], weights: &[f64; C]) -> Interpolated {
         let mut torque = [0.0; D];
         let (mut depth, mut energy) = (0.0, 0.0);
-        for (point, weight) in stencil.corners() {
+        for (&point, weight) in points.iter().zip(weights) {
             let record = &self.records[point * (D + 2)..(point + 1) * (D + 2)];
             for (sum, tau) in torque.iter_mut().zip(record) {
                 *sum += weight * tau;
@@ -83,16 +84,35 @@ impl Linear {
         torque.iter_mut().for_each(|tau| *tau *= held);
         Interpolated { torque, depth, energy, held }
     }
+
+    /// [`Interpolant::sample`]. `C = 2^D`.
+    fn sample_at<const D: usize, const C: usize>(&self, q: &[f64]) -> Sample {
+        let cell = Cell::of(&self.grid, q);
+        let (points, weights) = (corners::<C>(&self.grid, &cell.low), cell.weights::<C>());
+        let at = self.at::<D, C>(&points, &weights);
+        let mut around = Around::of(&self.points, self.grid.fade(q), points.into_iter().zip(weights));
+        around.flags.set(Flags::LAYER, at.held < 1.0);
+        around.share = at.held;
+        around.sample(at.torque, at.energy, at.depth > 0.0)
+    }
+
+    /// [`Interpolant::torques`]. `C = 2^D`.
+    fn torques_at<const D: usize, const C: usize>(&self, q: &[f64], torques: &mut [f64]) {
+        for (q, torque) in q.chunks_exact(D).zip(torques.chunks_exact_mut(D)) {
+            let (cell, fade) = (Cell::of(&self.grid, q), self.grid.fade(q));
+            let at = self.at::<D, C>(&corners(&self.grid, &cell.low), &cell.weights());
+            torque.iter_mut().zip(at.torque.iter()).for_each(|(out, tau)| *out = tau * fade);
+        }
+    }
 }
 
 impl Interpolant for Linear {
     fn sample(&self, q: &[f64]) -> Sample {
-        let stencil = self.grid.locate(q);
-        let at = with_joints!(self.grid.joints(), D => self.at::<D>(&stencil));
-        let mut around = Around::of(&self.points, stencil.fade, stencil.corners());
-        around.flags.set(Flags::LAYER, at.held < 1.0);
-        around.share = at.held;
-        around.sample(at.torque, at.energy, at.depth > 0.0)
+        with_joints!(self.grid.joints(), D => self.sample_at::<D, { 1 << D }>(q))
+    }
+
+    fn torques(&self, q: &[f64], torques: &mut [f64]) {
+        with_joints!(self.grid.joints(), D => self.torques_at::<D, { 1 << D }>(q, torques));
     }
 
     /// The greatest Frobenius norm of `S^-1/2 (d tau/d q) S^-1/2`, S = diag(slopes), before the layer. The gradient is
@@ -113,5 +133,9 @@ impl Interpolant for Linear {
             grid.axes.iter().zip(grid.neighbours(point)).zip(slopes.iter()).map(along).sum::<f64>()
         };
         (0..grid.points()).map(norm).fold(0.0, f64::max).sqrt()
+    }
+
+    fn tables(&self) -> Option<Tables<'_>> {
+        Some(Tables { records: &self.records, free_energy: 0.0, compliance: Some(self.layer.compliance()) })
     }
 }

@@ -61,8 +61,29 @@ trait Interpolant: Send + Sync {
     /// [`TorqueField::sample`]. Never allocates.
     fn sample(&self, q: &[f64]) -> Sample;
 
+    /// The torque alone of each row of `q`, to the bit that of [`Interpolant::sample`], to the same row of `torques`; both
+    /// of one entry per joint. Never allocates.
+    fn torques(&self, q: &[f64], torques: &mut [f64]);
+
     /// [`TorqueField::relative_stiffness`].
     fn relative_stiffness(&self, slopes: &JointVector) -> f64;
+
+    /// [`TorqueField::tables`].
+    fn tables(&self) -> Option<Tables<'_>>;
+}
+
+/// The numbers that a look-up over a uniform grid reads, for look-ups elsewhere: in arrays that learners differentiate, on
+/// a graphics card.
+#[derive(Clone, Copy, Debug)]
+pub struct Tables<'a> {
+    /// Those of each grid point, in C order. Of a potential w, its gradient and its mixed derivatives in the order of
+    /// [`crate::store::record`], lengths in steps of the grid (sqrt(J)); of a linear field the torque (N m or N), the depth
+    /// below the boundary (sqrt(J)) and the energy (J).
+    pub records: &'a [f64],
+    /// Energy of a potential without contact (J).
+    pub free_energy: f64,
+    /// 1 / Ks of the boundary layer of a linear field, joint by joint (rad/(N m)); a potential has none.
+    pub compliance: Option<JointVector>,
 }
 
 /// The field at one configuration.
@@ -194,6 +215,12 @@ impl TorqueField {
     #[must_use]
     pub fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         self.interpolant.relative_stiffness(slopes)
+    }
+
+    /// The numbers that look-ups read; none where several levels of a store hold them.
+    #[must_use]
+    pub fn tables(&self) -> Option<Tables<'_>> {
+        self.interpolant.tables()
     }
 
     /// The field at `q`, one entry per joint. Never allocates; takes the same time wherever `q` is.

@@ -17,7 +17,7 @@
 //! goes from one to the other within the cell, smoothly, with a torque of about the jump over h.
 
 use super::{
-    Flags, Interpolant, Sample,
+    Flags, Interpolant, Sample, Tables,
     bernstein::Bernstein,
     points::Around,
     stiffness::{Steepest, Stiffness},
@@ -34,6 +34,9 @@ use std::sync::Arc;
 pub(super) trait RootNodes: Levels {
     /// What they tell of `q`, in `cell` of the base, beside `root`, which was interpolated there.
     fn around(&self, q: &[f64], cell: &Cell, root: &Root) -> Around;
+
+    /// The numbers of all nodes, `width(d)` each in C order, where they are those of one grid.
+    fn records(&self) -> Option<&[f64]>;
 }
 
 /// The potential over nodes of its root.
@@ -69,8 +72,21 @@ impl<N: RootNodes> Interpolant for Potential<N> {
         around.sample(root.torque(), self.free_energy + root.energy(), root.value > 0.0)
     }
 
+    fn torques(&self, q: &[f64], torques: &mut [f64]) {
+        let base = self.nodes.base();
+        for (q, torque) in q.chunks_exact(base.joints()).zip(torques.chunks_exact_mut(base.joints())) {
+            let (root, fade) = (root(&*self.nodes, Cell::of(base, q)), base.fade(q));
+            torque.iter_mut().zip(root.torque().iter()).for_each(|(out, tau)| *out = tau * fade);
+        }
+    }
+
     fn relative_stiffness(&self, slopes: &JointVector) -> f64 {
         self.steepest.norm(slopes, || self.steepest(slopes))
+    }
+
+    fn tables(&self) -> Option<Tables<'_>> {
+        let records = self.nodes.records()?;
+        Some(Tables { records, free_energy: self.free_energy, compliance: None })
     }
 }
 
@@ -82,6 +98,10 @@ impl RootNodes for Store {
         flags.set(Flags::UNCONVERGED, root.failed);
         let index = f64::from(u8::from(root.value > 0.0));
         Around { fade: self.base().fade(q), share: 1.0, flags, index, contact_nodes: 0 }
+    }
+
+    fn records(&self) -> Option<&[f64]> {
+        None
     }
 }
 

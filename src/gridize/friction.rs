@@ -8,7 +8,8 @@
 //!
 //! At a turn friction does not change sides at once. The stiffness by which it builds up is that with which the law of
 //! the loop meets the rows of the log, in their order, best. Every fourth *stroke*, from turn to turn, is held out of a
-//! second identification, which has to predict it.
+//! second identification, which has to predict it. A joint whose torque it predicts worse than without friction has none:
+//! something else makes its directions differ.
 
 use super::{
     Branches, Cells, ForceHistory, GridizeOptions, GridizeReport, LeadDirection, golden::golden_section, gridize,
@@ -54,18 +55,20 @@ pub fn gridize_sliding(
     reversals: &Reversals<'_>,
     options: &GridizeOptions,
 ) -> Result<(Dataset, GridizeReport), Error> {
-    let (mut dataset, report, deviation) = reversals.gridize(joints, options, |_| true)?;
-    let stiffness = reversals.stiffness(&dataset, |_| true)?;
+    let mut has_friction = vec![true; joints.len()];
     let strokes = reversals.strokes().into_iter().flatten().max().map_or(0, |last| last + 1);
     let mut predicted = Vec::new();
     if strokes >= HELD_OUT {
         let is_out = |stroke: usize| stroke % HELD_OUT == HELD_OUT - 1;
-        let (rest, ..) = reversals.gridize(joints, options, |stroke| !is_out(stroke))?;
+        let (rest, ..) = reversals.gridize(joints, &has_friction, options, |stroke| !is_out(stroke))?;
         let known = reversals.stiffness(&rest, |stroke| !is_out(stroke))?;
         if let Some(known) = known {
             predicted = reversals.misfit(&rest, known, is_out)?.unwrap_or_default();
         }
     }
+    has_friction.iter_mut().zip(&predicted).for_each(|(has, [with, without])| *has = with < without);
+    let (mut dataset, report, deviation) = reversals.gridize(joints, &has_friction, options, |_| true)?;
+    let stiffness = reversals.stiffness(&dataset, |_| true)?;
     dataset.provenance.friction =
         Some(IdentifiedFriction { coefficient: 1.0, strokes, deviation, stiffness, predicted });
     Ok((dataset, report))
@@ -91,11 +94,12 @@ impl Reversals<'_> {
         self.histories.iter().map(of).collect()
     }
 
-    /// The dataset of the strokes that `takes` says, and by how much its friction differs from pass to pass, over its
-    /// size, rms (1).
+    /// The dataset of the strokes that `takes` says, with the friction of those joints that have it, and by how much that
+    /// of all differs from pass to pass, over its size, rms (1).
     fn gridize(
         &self,
         joints: &[JointLabel],
+        has_friction: &[bool],
         options: &GridizeOptions,
         takes: impl Fn(usize) -> bool,
     ) -> Result<(Dataset, GridizeReport, f64), Error> {
@@ -123,7 +127,8 @@ impl Reversals<'_> {
         let (mut forces, mut jacobians) = (vec![0.0; points], Vec::with_capacity(points * entries(count)));
         let mut status = dataset.status.to_vec();
         for point in 0..points {
-            let (centre, half) = (dataset.torque(point), JointVector::from_slice(friction.torque(point)));
+            let (centre, mut half) = (dataset.torque(point), JointVector::from_slice(friction.torque(point)));
+            half.iter_mut().zip(has_friction).filter(|(_, has)| !**has).for_each(|(half, _)| *half = 0.0);
             // Where the torque is no lower on the way up, noise is all there is.
             let size = if half[self.lead] > 0.0 { half.norm() } else { 0.0 };
             forces[point] = size as f32;
@@ -156,9 +161,11 @@ impl Reversals<'_> {
         let forces =
             dataset.slip.iter().flat_map(|slip| slip.normal_force.iter().copied().filter(|force| *force > 0.0));
         let (count, sum) = forces.fold((0.0, 0.0), |(count, sum), force| (count + 1.0, sum + f64::from(force)));
+        if count == 0.0 {
+            return Ok(None);
+        }
         let side = self.cell.iter().copied().fold(f64::INFINITY, f64::min);
-        let [stiffest, softest] =
-            BUILDING_UP.map(|way| (sum / f64::max(count, 1.0) / (way * side)).max(f64::MIN_POSITIVE).ln());
+        let [stiffest, softest] = BUILDING_UP.map(|way| (sum / count / (way * side)).ln());
         let misfit = |logarithm: f64| -> Result<f64, Error> {
             let errors = self.misfit(dataset, logarithm.exp(), &takes)?;
             Ok(errors.map_or(f64::INFINITY, |errors| errors.iter().map(|[with, _]| with * with).sum()))
@@ -253,13 +260,10 @@ mod tests {
         history
     }
 
-    #[test]
-    fn friction_comes_back_from_a_log_that_goes_to_and_fro_and_predicts_strokes_held_out() {
-        let label = |name: &str| JointLabel { name: name.into(), unit: "rad".into() };
-        let joints = [label("drive"), label("other")];
-        let mut noise = Random::new(3);
-        let histories = [0.4, 0.5, 0.6].map(|gear| log(10.0 * gear, gear, &mut noise));
-        let reversals = Reversals { histories: &histories, lead: 0, cell: &[0.01, 0.01] };
+    /// Grid and friction of the logs.
+    fn identified(histories: &[ForceHistory]) -> Dataset {
+        let joints = ["drive", "other"].map(|name| JointLabel { name: name.into(), unit: "rad".into() });
+        let reversals = Reversals { histories, lead: 0, cell: &[0.01, 0.01] };
         let interpolation = gridize::Interpolation::Linear;
         let options = GridizeOptions {
             steps: vec![0.02],
@@ -268,9 +272,37 @@ mod tests {
             smooth: false,
             within: f64::INFINITY,
         };
-        let (dataset, report) = gridize_sliding(&joints, &reversals, &options).unwrap();
+        gridize_sliding(&joints, &reversals, &options).unwrap().0
+    }
+
+    /// What tells the directions of a joint apart from stroke to stroke otherwise is no friction.
+    #[test]
+    fn a_joint_whose_held_out_strokes_friction_predicts_worse_has_none() {
+        let mut noise = Random::new(4);
+        let mut histories = [0.4, 0.5, 0.6].map(|gear| log(10.0 * gear, gear, &mut noise));
+        let strokes = Reversals { histories: &histories, lead: 0, cell: &[] }.strokes();
+        for (history, strokes) in histories.iter_mut().zip(strokes) {
+            for (torque, stroke) in history.torques.chunks_exact_mut(2).zip(strokes) {
+                // A load on the way back that those held out do not have.
+                torque[1] += if stroke % HELD_OUT == 1 { -0.05 } else { 0.05 };
+            }
+        }
+        let dataset = identified(&histories);
+        let found = dataset.provenance.friction.as_ref().unwrap();
+        let [[drive, without_drive], [other, without_other]] = found.predicted[..] else { panic!("{found:?}") };
+        assert!(drive < 0.5 * without_drive && other >= without_other, "{found:?}");
+        let rows = dataset.slip.as_ref().unwrap();
+        assert!(rows.jacobian.chunks_exact(entries(2)).all(|row| row[1..] == [0.0; 2]));
+        assert!(rows.normal_force.iter().copied().fold(0.0, f32::max) > 0.03);
+    }
+
+    #[test]
+    fn friction_comes_back_from_a_log_that_goes_to_and_fro_and_predicts_strokes_held_out() {
+        let mut noise = Random::new(3);
+        let histories = [0.4, 0.5, 0.6].map(|gear| log(10.0 * gear, gear, &mut noise));
+        let dataset = identified(&histories);
         let found = dataset.provenance.friction.clone().unwrap();
-        println!("{found:?}, {report:?}");
+        println!("{found:?}");
         assert_eq!(found.strokes, 9 + 11 + 13);
         assert!((found.stiffness.unwrap() / STIFFNESS - 1.0).abs() < 0.1, "{found:?}");
         let slip = dataset.slip.as_ref().unwrap();

@@ -121,4 +121,13 @@ impl Mechanics {
             factor,
         })
     }
+
+    /// Displacements of the object's nodes at rest under `forces`, one for each of them (N; m).
+    #[must_use]
+    pub fn displacement_under(&self, forces: &[DVec3]) -> Vec<DVec3> {
+        let mut displacement = vec![DVec3::ZERO; self.moved.len()];
+        self.attachment.spread(forces, &mut displacement);
+        self.factor.solve(&mut displacement);
+        (0..self.attachment.rows()).map(|node| self.attachment.follow(node, &displacement)).collect()
+    }
 }

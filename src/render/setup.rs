@@ -66,7 +66,8 @@ impl Setup {
     fn of(dataset: &Dataset, live: Option<Arc<LiveScene>>) -> Result<Self, Error> {
         if dataset.scene.trim().is_empty() {
             return Err(
-                "the dataset holds no scene, so that its proxy and gains are not known: bake or gridize it with one"
+                "the dataset holds no scene, so that its arm and gains are not known: gridize it again with --scene ARM.toml, \
+                 a scene whose [[proxy.joint]] are the joints of the log in their order, or bake one"
                     .into(),
             );
         }

@@ -94,11 +94,11 @@ impl ContactSpec {
 /// How equation (2) is solved for one configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum ContactLaw {
-    /// Minimum of the stored energy with depths and directions before the surface at rest: a convex problem, with one
-    /// solution.
+    /// Depth and direction are measured from the undeformed surface. The energy's minimum is a convex problem: fast, and
+    /// with one solution.
     #[default]
     Rest,
-    /// Minimum of the stored energy with depths and directions before the deformed surface.
+    /// Depth and direction are measured from the deformed surface: right for deep contact, and 4 to 8 times slower.
     #[value(alias = "energy")]
     Following,
 }

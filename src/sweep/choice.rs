@@ -13,13 +13,13 @@ use crate::{
 /// Choices of a backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum BackendChoice {
-    /// The CPU for work of some seconds; for longer work all hardware GPUs of the best kind, if there are any. Hardware
-    /// GPUs that WGPU_ADAPTER_NAME names are always taken.
+    /// The CPU for short work; for longer work all hardware GPUs of the fastest kind, if there are any. Hardware GPUs
+    /// that WGPU_ADAPTER_NAME names are always taken.
     #[default]
     Auto,
     /// All cores, f64; never touches Vulkan.
     Cpu,
-    /// The same of any adapters, software Vulkan included, or an error.
+    /// Any graphics adapters, software Vulkan included; an error if there are none.
     Gpu,
 }
 

@@ -55,6 +55,11 @@ const AROUND: usize = 1 << 10;
 /// Grid points that a thread looks through at a time (1): larger leaves threads without, smaller takes memory.
 const STRETCH: usize = 1 << 12;
 
+/// How far the energy changes along an edge of a cell from what the torques at its ends work, over the work of the rms
+/// torque along it, where the edge is cut (1): a smooth torque whose slope turns by the rms torque within a step changes
+/// by a twelfth of that.
+const CUT: f64 = 0.1;
+
 /// How the error of a dataset is measured.
 #[derive(Clone, Copy)]
 pub(super) struct ErrorCheck<'a> {
@@ -129,6 +134,7 @@ impl ErrorCheck<'_> {
             Ok(InterpolationError::of(interpolation.name(), errors))
         });
         let mut error = reference.measured(self.interpolation, errors.collect::<Result<_, Error>>()?);
+        error.cut = (!places.is_empty()).then(|| cut_cells(grid, table, &places, &reference));
         error.geometry = self.geometry_error(&reference);
         error.friction = reference.friction_excess(self.model);
         let cells = places.par_iter().map(|place| {
@@ -156,6 +162,26 @@ impl ErrorCheck<'_> {
         });
         Some(GeometryError { rms: (squares / f64::from(count.max(1))).sqrt(), depth })
     }
+}
+
+/// Returns the share of the cells of `places` with a cut edge: one along which the energy changes by more than [`CUT`]
+/// says from the work of the torques at its ends, with the rms torque of `reference` (1).
+fn cut_cells(grid: &Grid, table: &Table<'_>, places: &[Place], reference: &Reference) -> f64 {
+    let joints = grid.joints();
+    let is_cut = |place: &&Place| {
+        let corners: Vec<PointResult> = corners(grid, &place.cell).map(|corner| table.result(corner)).collect();
+        (0..corners.len()).any(|low| {
+            (0..joints).filter(|axis| low >> axis & 1 == 0).any(|axis| {
+                let (from, to, joint) = (&corners[low], &corners[low | 1 << axis], joints - 1 - axis);
+                let mean = 0.5 * (from.torque[joint] + to.torque[joint]);
+                let mut off = JointVector::zeros(joints);
+                off[joint] = (to.energy - from.energy) / grid.axes[joint].step + mean;
+                let is_known = !from.status.is_failed() && !to.status.is_failed();
+                is_known && reference.norm.square(&off, &JointVector::zeros(joints)) > (CUT * reference.torque).powi(2)
+            })
+        })
+    };
+    places.par_iter().filter(is_cut).count() as f64 / places.len() as f64
 }
 
 /// Evaluates an interpolation of the grid, with its threshold and slope, at each place; grids of at most `whole` points
@@ -368,6 +394,34 @@ mod tests {
             assert!(again.len() == 1200 && again.iter().zip(&places).all(alike), "{together}");
         }
         assert_eq!(corners(&grid, &[3, 1]).collect::<Vec<_>>(), [13, 14, 17, 18]);
+    }
+
+    /// One joint: the energy of a spring is cut nowhere, however stiff, and where it leaps it is cut in the leap's cell.
+    #[test]
+    fn a_leap_of_the_energy_cuts_its_cell_alone() {
+        let grid = grids::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
+        let norm = EffortNorm::new(["rad", "rad"]);
+        let share = |leap: f64| {
+            let mut columns = Columns::default();
+            for point in 0..grid.points() {
+                let q = grid.configuration(point);
+                let mut equilibrium = Equilibrium::free(-0.01, 2);
+                equilibrium.status = Status::Contact;
+                equilibrium.energy = 0.5 * q[0] * q[0] + if q[0] > 0.25 { leap } else { 0.0 };
+                equilibrium.torque = JointVector::from_slice(&[-q[0], 0.0]);
+                columns.push(&equilibrium, SHAPE);
+            }
+            let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
+            let places = places(&grid, &table, 32, 700, DRAWS);
+            let mut equilibrium = Equilibrium::free(0.0, 2);
+            equilibrium.torque[0] = 0.5;
+            let reference = Reference::of(norm, [(places[0].q, equilibrium)]);
+            cut_cells(&grid, &table, &places, &reference)
+        };
+        // A tenth of the work of the rms torque, 0.5 N m over 0.1 rad, is 5 mJ.
+        assert_eq!([share(0.0), share(0.0049)], [0.0; 2]);
+        // The cells from 0.2 to 0.3 are a seventh of all; binomial, of standard deviation 0.013.
+        assert!((share(0.0051) - 1.0 / 7.0).abs() < 0.06, "{}", share(0.0051));
     }
 
     #[test]

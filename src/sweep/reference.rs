@@ -165,6 +165,7 @@ impl Reference {
             unit: self.norm.unit,
             interpolation: interpolation.name().to_owned(),
             errors,
+            cut: None,
             geometry: None,
             friction: None,
         }

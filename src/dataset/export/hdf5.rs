@@ -2,7 +2,8 @@
 //! labels.
 //!
 //! `q1` .. `qd` are the grid lines of each axis; they are dimension scales, attached to every array over the grid, so
-//! that h5py, xarray and MATLAB know the coordinates. `joint_names` and `joint_units` are texts, and so are `scene` and
+//! that h5py, xarray and MATLAB know the coordinates. Every other axis has a scale of its own name, whose entries are
+//! counted from 0: readers of netCDF-4, xarray among them, take an axis without a scale for a wrong one. `joint_names` and `joint_units` are texts, and so are `scene` and
 //! `provenance`, datasets of their own because an attribute holds 64 KiB at most. Nothing is compressed: numbers of a
 //! smooth field hardly are.
 //!
@@ -10,13 +11,14 @@
 //! streams.
 
 use super::{
-    super::{Dataset, Grid, error::unwritable, file, replace_file},
+    super::{Dataset, error::unwritable, file, replace_file},
     lines, lines_name,
 };
 use crate::{Error, memory};
 use hdf5_writer::{AttributeBuilder, ByteOrder, DatasetBuilder, Datatype, Hdf5Builder, Hdf5WritePlan, WriteOptions};
 use safetensors::Dtype;
 use std::{
+    collections::BTreeMap,
     io::{self, Write},
     path::{Path, PathBuf},
 };
@@ -37,24 +39,35 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
 
 fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {
     let grid = &dataset.grid;
-    let (mut builder, mut over_grid) = (Hdf5Builder::new(), Vec::new());
+    let mut builder = Hdf5Builder::new();
+    // By name, the arrays that an axis belongs to, with its number there.
+    let mut attached = BTreeMap::<String, (u64, Vec<(String, u32)>)>::new();
     for (array, tensor) in file::arrays(dataset) {
         let (axes, of_grid) = array.axes(grid);
         let shape: Vec<u64> = tensor.shape.iter().map(|&count| count as u64).collect();
-        let mut described = DatasetBuilder::new(tensor.name, datatype(tensor.dtype)?, shape)
+        let scales: Vec<String> =
+            axes.iter().enumerate().map(|(k, axis)| if k < of_grid { lines_name(k) } else { axis.clone() }).collect();
+        for ((k, scale), &length) in (0..).zip(&scales).zip(&shape) {
+            attached.entry(scale.clone()).or_insert((length, Vec::new())).1.push((tensor.name.into(), k));
+        }
+        let scales = scales.into_iter().map(|scale| vec![scale]).collect();
+        let described = DatasetBuilder::new(tensor.name, datatype(tensor.dtype)?, shape)
             .raw_data(tensor.contents)
             .attribute(AttributeBuilder::fixed_string("units", array.unit(grid)))
-            .attribute(AttributeBuilder::vlen_strings("DIMENSION_LABELS", &axes)?);
-        if of_grid > 0 {
-            over_grid.push(tensor.name);
-            let scales = (0..axes.len()).map(|k| if k < of_grid { vec![lines_name(k)] } else { vec![] });
-            described =
-                described.attribute(AttributeBuilder::vlen_object_references("DIMENSION_LIST", scales.collect()));
-        }
+            .attribute(AttributeBuilder::vlen_strings("DIMENSION_LABELS", &axes)?)
+            .attribute(AttributeBuilder::vlen_object_references("DIMENSION_LIST", scales));
         builder = builder.dataset(described);
     }
-    for k in 0..grid.joints() {
-        builder = builder.dataset(scale(grid, k, &over_grid)?);
+    for (k, axis) in grid.axes.iter().enumerate() {
+        let (_, arrays) = attached.remove(&lines_name(k)).unwrap_or_default();
+        let coordinates: Vec<f64> = lines(axis).collect();
+        let lines = DatasetBuilder::typed_data(lines_name(k), vec![axis.count as u64], &coordinates)?;
+        builder = builder.dataset(scale(lines, &axis.name, &axis.unit, arrays));
+    }
+    for (name, (length, arrays)) in attached {
+        let entries: Vec<u64> = (0..length).collect();
+        builder =
+            builder.dataset(scale(DatasetBuilder::typed_data(&name, vec![length], &entries)?, &name, "1", arrays));
     }
     let texts = |name, texts: Vec<&str>| DatasetBuilder::vlen_string_data(name, vec![texts.len() as u64], &texts);
     let text = |name, text: &str| DatasetBuilder::vlen_string_data(name, vec![], &[text]);
@@ -67,16 +80,13 @@ fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {
         .into_plan()
 }
 
-/// The grid lines of axis `k` as a scale of the arrays `over_grid`.
-fn scale(grid: &Grid, k: usize, over_grid: &[&str]) -> hdf5_writer::Result<DatasetBuilder> {
-    let axis = &grid.axes[k];
-    let coordinates: Vec<f64> = lines(axis).collect();
-    let attached = over_grid.iter().map(|name| ((*name).to_owned(), k as u32)).collect();
-    Ok(DatasetBuilder::typed_data(lines_name(k), vec![axis.count as u64], &coordinates)?
+/// Makes `coordinates` a dimension scale, called `name`, of `arrays`: each with the number of the axis there.
+fn scale(coordinates: DatasetBuilder, name: &str, unit: &str, arrays: Vec<(String, u32)>) -> DatasetBuilder {
+    coordinates
         .attribute(AttributeBuilder::fixed_string("CLASS", "DIMENSION_SCALE"))
-        .attribute(AttributeBuilder::fixed_string("NAME", &axis.name))
-        .attribute(AttributeBuilder::fixed_string("units", &axis.unit))
-        .attribute(AttributeBuilder::object_reference_list("REFERENCE_LIST", attached)))
+        .attribute(AttributeBuilder::fixed_string("NAME", name))
+        .attribute(AttributeBuilder::fixed_string("units", unit))
+        .attribute(AttributeBuilder::object_reference_list("REFERENCE_LIST", arrays))
 }
 
 fn datatype(dtype: Dtype) -> hdf5_writer::Result<Datatype> {

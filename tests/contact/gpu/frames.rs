@@ -78,9 +78,9 @@ fn an_isotropic_body_binds_one_number_for_a_pair_of_nodes() {
         let stiffness = &object.mechanics().unwrap().stiffness;
         let (nodes, blocks) = (object.rest.len() as u64, stiffness.blocks.len() as u64);
         let update = FrameUpdate::new(context(), &object, 1.0 / 60.0).unwrap();
-        // Numbers of four bytes: two parameters, the structure of K and its blocks, mass and damping, force, state, and
-        // right-hand side.
-        let others = 2 + (nodes + 1 + blocks) + 9 * blocks + (2 + 4 + 8 + 3) * nodes;
+        // Numbers of four bytes: room for four parameters, the structure of K and its blocks, mass and damping, force,
+        // state, and right-hand side.
+        let others = 4 + (nodes + 1 + blocks) + 9 * blocks + (2 + 4 + 8 + 3) * nodes;
         (stiffness.is_isotropic(), update.bytes() / 4 - others, nodes.pow(2))
     };
     let (is_isotropic, numbers, pairs) = of(&|_| ());
