@@ -1,8 +1,9 @@
 // What all drawing stages share: the view and the light. Colours are gamma-encoded, as the window takes them.
 
 struct View {
-    // World to clip space.
+    // World to clip space; from where the object is to where it is being moved.
     clip: mat4x4<f32>,
+    object: mat4x4<f32>,
     eye: vec4<f32>,
     // Direction towards the key light, unit length.
     light: vec4<f32>,

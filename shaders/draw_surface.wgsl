@@ -44,14 +44,15 @@ fn node_normal(node: u32) -> vec3<f32> {
 fn vertex(@builtin(vertex_index) index: u32) -> Corner {
     let corner = index % 3u;
     let node = mesh[index];
-    let position = deformed(node);
+    let position = (view.object * vec4<f32>(deformed(node), 1.0)).xyz;
     var share = vec3<f32>(0.0);
     share[corner] = 1.0;
     var quantity = length(state[node].xyz);
     if view.quantity == 1u {
         quantity = length(forces[node].xyz);
     }
-    return Corner(view.clip * vec4<f32>(position, 1.0), position, node_normal(node), share, quantity);
+    let normal = (view.object * vec4<f32>(node_normal(node), 0.0)).xyz;
+    return Corner(view.clip * vec4<f32>(position, 1.0), position, normal, share, quantity);
 }
 
 fn mapped(share: f32) -> vec3<f32> {

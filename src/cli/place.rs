@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let refusal = refusal(&placing);
     let (mut tables, mut written) = (None, None);
     if refusal.is_none() {
-        let found = tables_of(&placing, &scene)?;
+        let found = placing.tables(&scene.proxy.joints)?;
         text.replace(&found)?;
         if arguments.write {
             written = Some(output::rewrite(&scene, &text.to_string())?);
@@ -153,15 +153,6 @@ fn refusal(placing: &Placing) -> Option<String> {
     }
     let in_the_way = "choose a point from which the rest of the arm keeps away (--at), or move the object (--move)";
     (!placing.is_clear()).then(|| in_the_way.to_owned())
-}
-
-/// Returns the tables of grid and motions.
-fn tables_of(placing: &Placing, scene: &Scene) -> Result<String, Failure> {
-    let mut tables = String::new();
-    placing.press.write_grid(&mut tables, &scene.proxy.joints)?;
-    tables.push('\n');
-    placing.press.write_motion(&mut tables)?;
-    Ok(tables)
 }
 
 impl Describe for Placed {

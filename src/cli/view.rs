@@ -13,6 +13,7 @@ use std::path::PathBuf;
 
 /// Arguments of `haptize view`.
 #[derive(clap::Args)]
+#[command(group = clap::ArgGroup::new("drawn").args(["screenshot", "video"]))]
 #[command(after_help = concat!(
     "\
 Examples:
@@ -20,7 +21,8 @@ Examples:
   haptize view sphere.haptize
   haptize view touch.haptize --device touch --hold-key
   haptize view datasets/organ.toml       nothing baked: contact is solved in every tick
-  haptize view sphere.haptize --screenshot window.png --motion scrape --time 2.5 --dark",
+  haptize view sphere.haptize --screenshot window.png --motion scrape --time 2.5 --dark
+  haptize view sphere.haptize --video press.gif --size 640x480",
     adapter_help!()
 ))]
 pub struct Arguments {
@@ -28,7 +30,7 @@ pub struct Arguments {
     /// sphere, which is baked first.
     file: Option<PathBuf>,
     /// A real device leads the arm instead of the pointer: KIND or KIND:PLACE, as `haptize device list` shows it.
-    #[arg(long, value_name = "NAME", conflicts_with = "screenshot")]
+    #[arg(long, value_name = "NAME", conflicts_with = "drawn")]
     device: Option<Address>,
     /// Torque only while the space bar is held in the window (a dead-man key).
     #[arg(long, requires = "device")]
@@ -36,14 +38,17 @@ pub struct Arguments {
     /// Write the window to this PNG file instead of opening it: needs a Vulkan driver, of which a software one will do, and no display.
     #[arg(long, value_name = "PNG")]
     screenshot: Option<PathBuf>,
+    /// Write the 3-D picture over the motion to this file, whose name ends in .gif, or as PNG files into this new folder.
+    #[arg(long, value_name = "FILE")]
+    video: Option<PathBuf>,
     /// The picture's size (points).
-    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x800", requires = "screenshot", value_parser = size)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x800", requires = "drawn", value_parser = size)]
     size: [f32; 2],
     /// The picture in dark colours.
-    #[arg(long, requires = "screenshot")]
+    #[arg(long, requires = "drawn")]
     dark: bool,
     /// The motion that the picture shows, press or scrape; by default the press, where there is one.
-    #[arg(long, requires = "screenshot", value_parser = ["press", "scrape"])]
+    #[arg(long, requires = "drawn", value_parser = ["press", "scrape"])]
     motion: Option<String>,
     /// When in that motion the picture is taken (s).
     #[arg(long, default_value_t = 2.2, requires = "screenshot")]
@@ -72,11 +77,23 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         DeviceChoice { address, hold_key, stop }
     });
     let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
+    let picture = Picture {
+        size: arguments.size,
+        dark: arguments.dark,
+        motion: arguments.motion.clone(),
+        time: arguments.time,
+        ..Picture::default()
+    };
+    if let Some(path) = &arguments.video {
+        let replaced = output::check(path, Content::Product, arguments.file.as_deref())?;
+        let stills = viewer::video(&start, &picture, path)?;
+        return Report::new(&Shown { file: Some(path.display().to_string()), stills: Some(stills), replaced });
+    }
     let Some(file) = &arguments.screenshot else {
         let shown = viewer::open(start, device);
         interrupt::over();
         shown?;
-        return Report::new(&Shown { file: None, replaced: None });
+        return Report::new(&Shown { file: None, stills: None, replaced: None });
     };
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(format!("{}: the picture is a PNG file: give a name that ends in .png", file.display()).into());
@@ -91,15 +108,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             format!("the window has no room below {least_width}x{least_height} points: give a larger --size").into()
         );
     }
-    let picture = Picture {
-        size: arguments.size,
-        dark: arguments.dark,
-        motion: arguments.motion.clone(),
-        time: arguments.time,
-        ..Picture::default()
-    };
     viewer::screenshot(&start, &picture, file)?;
-    Report::new(&Shown { file: Some(file.display().to_string()), replaced })
+    Report::new(&Shown { file: Some(file.display().to_string()), stills: None, replaced })
 }
 
 /// What was shown.
@@ -109,6 +119,9 @@ struct Shown {
     /// The picture, if one was drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     file: Option<String>,
+    /// Stills of a film.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stills: Option<usize>,
     #[serde(flatten)]
     replaced: Option<Replaced>,
 }
@@ -116,7 +129,12 @@ struct Shown {
 #[cfg(feature = "viewer")]
 impl Describe for Shown {
     fn describe(&self, text: &mut Text) {
-        self.file.iter().for_each(|file| text.line(format_args!("wrote {file}")));
+        if let Some(file) = &self.file {
+            match self.stills {
+                Some(stills) => text.line(format_args!("wrote {file}, {stills} stills")),
+                None => text.line(format_args!("wrote {file}")),
+            }
+        }
         self.replaced.describe(text);
     }
 }

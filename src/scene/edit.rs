@@ -2,9 +2,9 @@
 
 use super::check::Checker;
 use crate::Error;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use std::path::Path;
-use toml_edit::{DocumentMut, Item, Value};
+use toml_edit::{DocumentMut, Item, TableLike, Value};
 
 /// Text of a scene, to be changed.
 pub struct SceneText<'a> {
@@ -56,35 +56,63 @@ impl<'a> SceneText<'a> {
     /// Moves the object by `motion` (m): its centre, the height below which it is held, and its inclusions.
     pub fn move_object(&mut self, motion: DVec3) {
         let Some(object) = self.document.get_mut("object").and_then(Item::as_table_like_mut) else { return };
-        for shape in ["sphere", "mesh", "tetrahedra"] {
-            move_centre(object.get_mut(shape), motion);
-        }
-        if let Some(below) = object.get_mut("ground").and_then(|ground| ground.get_mut("below"))
-            && let Some(height) = number(below)
-        {
-            set(below, rounded(height + motion.z).into());
-        }
-        let Some(elasticity) = object.get_mut("elasticity") else { return };
-        let Some(inclusions) = elasticity.get_mut("inclusion") else { return };
-        let mut number = 0;
-        while let Some(inclusion) = inclusions.get_mut(number) {
-            move_centre(inclusion.get_mut("sphere"), motion);
-            number += 1;
+        move_held(object, motion.z);
+        move_centres(object, |_| motion);
+    }
+
+    /// Turns the object by `turned` about the point `about` (m), whose angles about x, then y, then z are then `turn`
+    /// (rad). The height below which it is held goes up by `raised` (m).
+    pub fn turn_object(&mut self, turn: DVec3, turned: DQuat, about: DVec3, raised: f64) {
+        let Some(object) = self.document.get_mut("object").and_then(Item::as_table_like_mut) else { return };
+        move_held(object, raised);
+        move_centres(object, |centre| about + turned * (centre - about) - centre);
+        for shape in ["mesh", "tetrahedra"] {
+            if let Some(shape) = object.get_mut(shape).and_then(Item::as_table_like_mut) {
+                set_vector(shape, "turn", turn);
+            }
         }
     }
 }
 
-/// Moves the key `centre` of a table, which is the origin where it is left out, by `motion` (m).
-fn move_centre(table: Option<&mut Item>, motion: DVec3) {
-    let Some(table) = table.and_then(Item::as_table_like_mut) else { return };
-    let centre = table.entry("centre").or_insert_with(|| Item::Value(Value::Array([0.0; 3].into_iter().collect())));
-    let old = |k: usize| centre.get(k).and_then(number).unwrap_or(0.0);
-    let moved = [0, 1, 2].map(|k| rounded(old(k) + motion[k]));
-    set(centre, Value::Array(moved.into_iter().collect()));
+/// Raises the height below which an object is held (m).
+fn move_held(object: &mut dyn TableLike, raised: f64) {
+    if let Some(below) = object.get_mut("ground").and_then(|ground| ground.get_mut("below"))
+        && let Some(height) = number(below)
+    {
+        set(below, rounded(height + raised).into());
+    }
+}
+
+/// Moves the centres of an object's shape and of its inclusions by the `motion` of each (m).
+fn move_centres(object: &mut dyn TableLike, motion: impl Fn(DVec3) -> DVec3) {
+    let moved = |table: Option<&mut Item>| {
+        let Some(table) = table.and_then(Item::as_table_like_mut) else { return };
+        // Left out, it is the origin.
+        let old = table.get("centre").cloned().unwrap_or_default();
+        let at = |k: usize| old.get(k).and_then(number).unwrap_or(0.0);
+        let centre = DVec3::new(at(0), at(1), at(2));
+        set_vector(table, "centre", centre + motion(centre));
+    };
+    for shape in ["sphere", "mesh", "tetrahedra"] {
+        moved(object.get_mut(shape));
+    }
+    let Some(elasticity) = object.get_mut("elasticity") else { return };
+    let Some(inclusions) = elasticity.get_mut("inclusion") else { return };
+    let mut number = 0;
+    while let Some(inclusion) = inclusions.get_mut(number) {
+        moved(inclusion.get_mut("sphere"));
+        number += 1;
+    }
 }
 
 fn number(item: &Item) -> Option<f64> {
     item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64))
+}
+
+/// Sets the key `name` of a table.
+fn set_vector(table: &mut dyn TableLike, name: &str, vector: DVec3) {
+    let value = Value::Array(vector.to_array().map(rounded).into_iter().collect());
+    set(table.entry(name).or_insert(Item::None), value);
 }
 
 /// Puts another value in the place of one; a comment behind it stays.

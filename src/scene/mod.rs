@@ -52,6 +52,8 @@ pub use shape::{LinkForm, LinkShape, LinkSurface, MAX_SHAPES, MAX_SURFACE};
 pub use skin::SkinSpec;
 
 pub(crate) use inertia::positive_semidefinite;
+#[cfg(feature = "viewer")]
+pub(crate) use value::rotation;
 
 use crate::{Error, ErrorKind, names};
 pub(crate) use check::Checker;

@@ -20,7 +20,7 @@ macro_rules! defaults {
 pub(super) use defaults;
 
 /// The rotation by angles about x, then y, then z (rad).
-pub(super) fn rotation(turn: DVec3) -> DQuat {
+pub(crate) fn rotation(turn: DVec3) -> DQuat {
     DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x)
 }
 

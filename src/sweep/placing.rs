@@ -7,7 +7,7 @@ use crate::{
     object::{Object, corners},
     proxy::{Chain, PRESS_GAP, Posture, Press, inverse_kinematics::approach, tip},
     random::Random,
-    scene::Scene,
+    scene::{JointSpec, Scene},
 };
 use glam::DVec3;
 use serde::Serialize;
@@ -74,6 +74,20 @@ impl Placing {
         Self::from(scene, &build_object(scene)?, wanted, None).map(Some)
     }
 
+    /// Puts the tip before the point of the surface that is nearest to it at `q`, and begins from there. `None` where the
+    /// arm has no contact node.
+    ///
+    /// # Errors
+    /// When the object is refused.
+    pub fn here(scene: &Scene, q: &JointVector) -> Result<Option<Self>, Error> {
+        let chain = Chain::new(&scene.proxy);
+        let Some(tip) = tip(&chain) else { return Ok(None) };
+        let mut pose = chain.new_pose();
+        chain.pose(q, &mut pose);
+        check_axes(scene)?;
+        Self::from(scene, &build_object(scene)?, Some(pose.nodes[tip]), Some((tip, *q))).map(Some)
+    }
+
     /// Moves the object of `scene` before the tip of its arm, to be pressed from above where the arm does that easily.
     /// Returns its motion (m), and what arm and object are to each other there; `None` where the arm has no contact
     /// node.
@@ -106,13 +120,18 @@ impl Placing {
         }
         let Some((posture, motion, pressed, _)) = best else { return Ok(None) };
         object.rest.iter_mut().for_each(|node| *node += motion);
-        let placing = Self::from(scene, &object, Some(pressed), Some(&posture))?;
+        let placing = Self::from(scene, &object, Some(pressed), Some((posture.node, posture.q)))?;
         Ok(Some((motion, Self { centre: scene.object.shape.centre() + motion, ..placing })))
     }
 
-    /// The same for `object`, which was built of the scene and perhaps moved; begins from `posture`, where there is
-    /// one.
-    fn from(scene: &Scene, object: &Object, wanted: Option<DVec3>, posture: Option<&Posture>) -> Result<Self, Error> {
+    /// The same for `object`, which was built of the scene and perhaps moved; begins with the tip and the configuration
+    /// of `posture`, where there are some.
+    fn from(
+        scene: &Scene,
+        object: &Object,
+        wanted: Option<DVec3>,
+        posture: Option<(usize, JointVector)>,
+    ) -> Result<Self, Error> {
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
         let model = Model::reaching(object, &chain, scene.contact, &[])?;
@@ -120,7 +139,7 @@ impl Placing {
         middle.iter_mut().zip(&chain.joints).for_each(|(q, joint)| *q = 0.5 * (joint.limits[0] + joint.limits[1]));
         let mut pose = chain.new_pose();
         chain.pose(&middle, &mut pose);
-        let tip = posture.map(|posture| posture.node).or_else(|| tip(&chain)).unwrap_or(0);
+        let tip = posture.map(|(node, _)| node).or_else(|| tip(&chain)).unwrap_or(0);
         let at = pose.nodes[tip];
         let body = corners(&object.rest[..object.surface_nodes]);
         let length = length(body);
@@ -133,7 +152,7 @@ impl Placing {
         let (mut random, mut proximity) = (Random::new(SEED), Proximity::new(&model));
         let mut best: Option<Attempt> = None;
         for number in 0..POSTURES {
-            let mut start = posture.map_or(middle, |posture| posture.q);
+            let mut start = posture.map_or(middle, |(_, q)| q);
             if number > 0 {
                 let joints = start.iter_mut().zip(&chain.joints);
                 joints.for_each(|(q, joint)| *q = random.between(joint.limits[0], joint.limits[1]));
@@ -163,6 +182,33 @@ impl Placing {
             gap,
             standoff,
         })
+    }
+
+    /// The tables of grid and motions, as a scene whose arm has `joints` has them.
+    ///
+    /// # Errors
+    /// None in a `String`.
+    pub fn tables(&self, joints: &[JointSpec]) -> Result<String, Error> {
+        let mut tables = String::new();
+        let written = self.press.write_grid(&mut tables, joints).and_then(|()| {
+            tables.push('\n');
+            self.press.write_motion(&mut tables)
+        });
+        written.map(|()| tables).map_err(|error| Error::from(error.to_string()))
+    }
+
+    /// Why the tip does not get before the point, if it does not, or what is in its way.
+    #[must_use]
+    pub fn refusal(&self) -> Option<String> {
+        let tip = "the tip does not get before the surface";
+        if !self.reaches() {
+            let short = 1e3 * self.short.length();
+            return Some(format!(
+                "{tip}: {short:.1} mm are missing; move the object nearer, or widen the joints' limits"
+            ));
+        }
+        let inside = -1e3 * self.gap;
+        (!self.is_clear()).then(|| format!("{tip}: the arm is {inside:.1} mm inside the object elsewhere; move either"))
     }
 
     /// Whether the tip gets before the point.

@@ -3,17 +3,21 @@
 
 use super::{
     ViewError,
+    background::Pending,
     feel::TickSource,
     files::Files,
+    film::{Film, Still},
     job::{Job, JobResult, Solver, Task},
     lead::DeviceChoice,
     notice::Notice,
+    offscreen::write_picture,
+    placing::ObjectPlace,
     plots::Plots,
     scene::SceneView,
     session::Session,
 };
 use crate::{
-    JointVector,
+    Error, JointVector,
     gpu::{Context, GpuError},
     input,
     render::timing::Timing,
@@ -66,6 +70,14 @@ pub struct Viewer {
     pub(super) solver: Solver,
     /// What was done last, until it has faded.
     pub(super) notice: Option<Notice>,
+    /// Whether the scene was changed here and not saved.
+    pub(super) is_unsaved: bool,
+    /// The film that is being taken.
+    pub(super) film: Option<Film>,
+    /// One that is being written.
+    pub(super) written: Option<Pending<Result<PathBuf, Error>>>,
+    /// Title of the window.
+    pub(super) title: String,
     /// The last error, until it is dismissed.
     pub(super) error: Option<String>,
     /// Frames of the window a second, over the last ones, where it goes by the clock.
@@ -120,6 +132,10 @@ impl Viewer {
             solvers: Solver::all(),
             solver: Solver::Auto,
             notice: None,
+            is_unsaved: false,
+            title: String::new(),
+            film: None,
+            written: None,
             error: None,
             frame_rate: None,
             shows_steps: pace == TickSource::Clock,
@@ -151,6 +167,15 @@ impl Viewer {
         self.device = Some(device);
     }
 
+    /// Keeps the files that were opened from one window to the next; the first screen is for who opens the first one.
+    pub fn keep_files(&mut self) {
+        use etcetera::BaseStrategy;
+        if let Ok(places) = etcetera::base_strategy::choose_native_strategy() {
+            let list = places.state_dir().unwrap_or_else(|| places.data_dir()).join("haptize").join("recent");
+            self.shows_steps &= !self.files.keep_in(list);
+        }
+    }
+
     /// Begins to open `start`.
     pub fn start(&mut self, start: &Start, egui: &egui::Context) {
         match start {
@@ -165,6 +190,7 @@ impl Viewer {
     /// Begins to open a scene or a dataset.
     pub(super) fn open_file(&mut self, path: &Path, egui: &egui::Context) {
         self.files.remember(path);
+        self.is_unsaved = false;
         self.begin(Task::Open(path.to_owned()), egui);
     }
 
@@ -191,15 +217,28 @@ impl Viewer {
     fn take(&mut self, outcome: JobResult) {
         match outcome {
             JobResult::Cancelled => {}
-            JobResult::Failed(reason) => self.error = Some(reason),
+            JobResult::Failed(reason) => {
+                self.error = Some(reason);
+                // What was being moved is where it was.
+                self.scene.placement = self.session.as_ref().and_then(|session| ObjectPlace::new(&session.loaded));
+            }
             JobResult::Loaded(loaded) => {
-                let (loaded, body) = *loaded;
+                let (mut loaded, body) = *loaded;
+                if let (true, Some(before)) = (loaded.edited, &self.session) {
+                    // The arm stays where it is.
+                    loaded.at = loaded.at.or_else(|| Some(before.feel.guide().goal()));
+                }
                 // Two sessions cannot hold one device: the one before ends first.
                 let ended = self.session.take_if(|session| session.lead.is_some()).map(|session| session.controls);
                 let device = self.device.as_ref();
                 match Session::new(loaded, self.pace, device) {
                     Ok(mut session) => {
-                        self.scene.open(&session.loaded, body);
+                        if session.loaded.edited {
+                            self.is_unsaved = true;
+                            self.scene.change(&session.loaded, body);
+                        } else {
+                            self.scene.open(&session.loaded, body);
+                        }
                         if let Some(before) = ended.as_ref().or(self.session.as_ref().map(|before| &before.controls)) {
                             session.controls.keep(before);
                         }
@@ -281,6 +320,62 @@ impl Viewer {
         self.scene.shown_at(self.scene.tip(&self.session.as_ref()?.loaded.setup.chain)?, rect)
     }
 
+    /// Takes a still of the film where one is due, after `elapsed` (s), and says when one is written.
+    fn record(&mut self, elapsed: f64) {
+        if let Some(film) = &mut self.film
+            && film.is_due(elapsed)
+        {
+            match self.scene.still() {
+                Ok(still) => still.into_iter().for_each(|still| film.take(still)),
+                Err(error) => self.error = Some(not_drawn(error.into())),
+            }
+        }
+        let written = self.written.as_ref().and_then(Pending::poll);
+        match written.map(|written| written.and_then(|file| file.map_err(|error| error.to_string()))) {
+            Some(Ok(file)) => self.notice = Some(Notice::new(format!("wrote {}", file.display()))),
+            Some(Err(error)) => self.error = Some(error),
+            None => return,
+        }
+        self.written = None;
+    }
+
+    /// The 3-D picture of what is open, of `size` pixels.
+    ///
+    /// # Errors
+    /// When the device fails, or nothing is open.
+    pub(super) fn picture(&mut self, size: [u32; 2], visuals: &egui::Visuals) -> Result<Still, ViewError> {
+        let picture = match &self.session {
+            Some(session) => self.scene.picture(size, &session.loaded, visuals)?,
+            None => None,
+        };
+        picture.ok_or_else(|| ViewError::Open("nothing is open".into()))
+    }
+
+    /// Begins a film of the 3-D picture, or ends it.
+    pub(super) fn toggle_film(&mut self, egui: &egui::Context) {
+        if let Some(film) = self.film.take() {
+            self.written = Some(film.end());
+            return;
+        }
+        let Some(session) = &self.session else { return };
+        let egui = egui.clone();
+        match Film::begin(self.files.fresh(&session.loaded.name, "gif"), move || egui.request_repaint()) {
+            Ok(film) => self.film = Some(film),
+            Err(error) => self.error = Some(error),
+        }
+    }
+
+    /// Writes the 3-D picture to a file, twice as fine as it is shown.
+    pub(super) fn save_picture(&mut self, visuals: &egui::Visuals) {
+        let (Some(session), Some(size)) = (&self.session, self.scene.size()) else { return };
+        let file = self.files.fresh(&session.loaded.name, "png");
+        let drawn = self.picture(size.map(|side| 2 * side), visuals);
+        match drawn.and_then(|(size, bytes)| write_picture(&file, size, &bytes)) {
+            Ok(()) => self.notice = Some(Notice::new(format!("wrote {}", file.display()))),
+            Err(error) => self.error = Some(not_drawn(error)),
+        }
+    }
+
     /// Whether nothing moves and nothing is made, so that another frame would look the same.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
@@ -288,6 +383,8 @@ impl Viewer {
         let busy =
             |session: &Session| session.lead.is_some() || session.feel.guide().is_running() || session.is_retuning();
         self.job.is_none()
+            && self.film.is_none()
+            && self.written.is_none()
             && !self.session.as_ref().is_some_and(busy)
             && !self.scene.is_redrawing()
             && self.still > SETTLED
@@ -303,6 +400,7 @@ impl Viewer {
             self.job = None;
             self.take(outcome);
         }
+        self.record(elapsed);
         let Some(session) = &mut self.session else { return };
         let wake = || {
             let egui = egui.clone();

@@ -302,8 +302,14 @@ mod tests {
             for elapsed in [0.0, 0.05] {
                 body.advance(&latest, elapsed).unwrap();
                 for (quantity, top) in [Quantity::Displacement, Quantity::Force].into_iter().zip(body.extremes) {
-                    let ground = (-1.0, [0.0; 3]);
-                    let look = Look { background: [0.0; 3], quantity, colour_top: top as f32, edge_width: 0.0, ground };
+                    let look = Look {
+                        background: [0.0; 3],
+                        quantity,
+                        colour_top: top as f32,
+                        edge_width: 0.0,
+                        object: glam::DAffine3::IDENTITY,
+                        ground: (-1.0, [0.0; 3]),
+                    };
                     let camera = Camera::looking_at(DVec3::ZERO, 0.05);
                     let picture =
                         renderer.draw([160, 120], &camera, &look, Some(&body.surface), None, (&[], 0)).unwrap();

@@ -2,8 +2,13 @@
 //! the window as well.
 
 use super::theme::{CHOOSER, FIELD_WIDTH, GROUP_GAP, LIST_HEIGHT};
+use crate::dataset::replace_file;
 use eframe::egui::{self, Key, RichText, ScrollArea, TextEdit, Ui};
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    io::Write,
+    path::{self, Path, PathBuf},
+};
 
 /// The chooser; shown while it is open.
 pub struct Files {
@@ -12,6 +17,8 @@ pub struct Files {
     folder: PathBuf,
     typed: String,
     recent: Vec<PathBuf>,
+    /// Where that list is kept from one window to the next, if it is.
+    kept: Option<PathBuf>,
     listing: Result<Vec<Entry>, String>,
 }
 
@@ -39,7 +46,15 @@ impl Files {
     /// Looks at `folder`.
     #[must_use]
     pub fn new(folder: PathBuf) -> Self {
-        Self { open: false, typed: String::new(), recent: Vec::new(), listing: list(&folder), folder }
+        Self { open: false, typed: String::new(), recent: Vec::new(), kept: None, listing: list(&folder), folder }
+    }
+
+    /// Keeps the list of files in `list` from now on, a path a line; answers whether there was one.
+    pub fn keep_in(&mut self, list: PathBuf) -> bool {
+        let known = fs::read_to_string(&list);
+        self.recent = known.iter().flat_map(|known| known.lines()).take(RECENT).map(PathBuf::from).collect();
+        self.kept = Some(list);
+        known.is_ok()
     }
 
     /// The folder that it looks at, where exports go too.
@@ -57,9 +72,17 @@ impl Files {
 
     /// Remembers that `file` was opened.
     pub fn remember(&mut self, file: &Path) {
-        self.recent.retain(|known| known != file);
-        self.recent.insert(0, file.to_owned());
+        // Another window may be opened elsewhere.
+        let file = path::absolute(file).unwrap_or_else(|_| file.to_owned());
+        self.recent.retain(|known| *known != file);
+        self.recent.insert(0, file);
         self.recent.truncate(RECENT);
+        if let Some(list) = &self.kept {
+            let lines: String = self.recent.iter().map(|file| format!("{}\n", file.display())).collect();
+            // A comfort: where it cannot be kept, it is not.
+            let folder = list.parent().map_or(Ok(()), fs::create_dir_all);
+            let _ = folder.and_then(|()| replace_file(list, |out| out.write_all(lines.as_bytes())));
+        }
     }
 
     /// Opens or closes the chooser; what lies in the folder is read again.
@@ -145,7 +168,7 @@ impl Files {
 /// Folders, scenes and datasets in `folder`, by name.
 fn list(folder: &Path) -> Result<Vec<Entry>, String> {
     let unreadable = |error| format!("{}: {error}; choose another folder", folder.display());
-    let mut entries: Vec<Entry> = std::fs::read_dir(folder)
+    let mut entries: Vec<Entry> = fs::read_dir(folder)
         .map_err(unreadable)?
         .filter_map(|entry| {
             let path = entry.ok()?.path();
@@ -193,10 +216,18 @@ mod tests {
 
     #[test]
     fn the_latest_files_come_first_and_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let list = folder.path().join("haptize/recent");
         let mut files = Files::new(PathBuf::from("."));
-        for name in ["a", "b", "a", "c"] {
+        assert!(!files.keep_in(list.clone()), "there is none before the first window");
+        for name in ["/a", "/b", "/a", "/c"] {
             files.remember(Path::new(name));
         }
-        assert_eq!(files.recent, [Path::new("c"), Path::new("a"), Path::new("b")]);
+        // The next window knows them.
+        let mut next = Files::new(PathBuf::from("."));
+        assert!(next.keep_in(list));
+        for files in [files, next] {
+            assert_eq!(files.recent, [Path::new("/c"), Path::new("/a"), Path::new("/b")]);
+        }
     }
 }

@@ -5,6 +5,7 @@ use super::{
     background::{ENDED, spawn},
     body::Body,
     loaded::Loaded,
+    placing::{Edit, edited},
 };
 use crate::{
     Error, ErrorKind,
@@ -34,6 +35,8 @@ pub enum Task {
     /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again
     /// then.
     Bake(Arc<Scene>, Option<Surface>),
+    /// Change a scene, which is then solved live.
+    Edit(Arc<Scene>, Edit),
 }
 
 /// The backend of a bake.
@@ -139,6 +142,7 @@ impl Job {
         let title = match &task {
             Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
             Task::Bake(scene, _) => format!("Haptizing {}", scene.name),
+            Task::Edit(scene, _) => format!("Placing {}", scene.name),
         };
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, reports) = mpsc::channel();
@@ -217,6 +221,10 @@ fn run(
         Task::Open(path) => {
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
+        }
+        Task::Edit(scene, edit) => {
+            let (scene, start) = edited(&scene, &edit)?;
+            Loaded { edited: true, at: start, ..Loaded::live(scene)? }
         }
         Task::Bake(scene, surface) => bake((*scene).clone(), surface, solver, context, stop, progress)?,
     };

@@ -29,6 +29,10 @@ pub struct Loaded {
     pub live: Option<Arc<LiveScene>>,
     /// The report of the bake, if this window baked it.
     pub report: Option<Arc<SweepReport>>,
+    /// Whether the scene was changed here, and where the arm is to stand then, if elsewhere (rad or m).
+    pub edited: bool,
+    /// See `edited`.
+    pub at: Option<JointVector>,
 }
 
 impl Loaded {
@@ -55,6 +59,8 @@ impl Loaded {
             forces: forces.map(Arc::new),
             live: None,
             report: None,
+            edited: false,
+            at: None,
         })
     }
 
@@ -103,10 +109,12 @@ impl Loaded {
             .collect()
     }
 
-    /// Returns where the device is at first: at the beginning of the first motion, else in the middle of the grid.
+    /// Returns where the device is at first: where it is to stand, or at the beginning of the first motion, else in the
+    /// middle of the grid.
     #[must_use]
     pub fn start(&self) -> JointVector {
-        self.motions().first().map_or_else(|| self.middle(), |(_, motion)| motion.at(0.0).0)
+        let begin = || self.motions().first().map_or_else(|| self.middle(), |(_, motion)| motion.at(0.0).0);
+        self.at.unwrap_or_else(begin)
     }
 
     /// The middle of the grid.

@@ -10,9 +10,11 @@
 //! | `feel`, `guide`, `history` | the haptic loop beside the window, who leads the hand, what was felt lately |
 //! | `lead` | a haptic device that leads in the place of all these |
 //! | `scene`, `overlay`, `body` | the 3-D panel, what lies on top of its picture, the object on the GPU |
+//! | `placing` | the object moved before the arm, the arm's pose taken for grid and motions |
 //! | `readout`, `probe` | numbers over that picture, the vertex that was clicked |
 //! | `steering`, `node_drag` | whence it is seen, and the pointer's grip on the proxy |
 //! | `view_renderer`, `pipelines`, `shapes`, `links`, `pixels` | the renderer of that panel |
+//! | `film` | the 3-D picture over time |
 //! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
 //! | `legend`, `notice`, `steps` | a sample and its name, a message that fades, the first screen |
 //!
@@ -27,6 +29,7 @@ mod column;
 mod controls;
 mod feel;
 mod files;
+mod film;
 mod friction;
 mod gains;
 mod guide;
@@ -44,6 +47,7 @@ mod palette;
 mod panels;
 mod pipelines;
 mod pixels;
+mod placing;
 mod plots;
 mod probe;
 mod readout;
@@ -61,7 +65,7 @@ pub use app::{Start, Viewer};
 pub use eframe::egui_wgpu::RenderState;
 pub use feel::TickSource;
 pub use lead::DeviceChoice;
-pub use offscreen::{Picture, render_state, screenshot};
+pub use offscreen::{Picture, render_state, screenshot, video};
 pub use theme::LEAST_WINDOW;
 pub use window::open;
 

@@ -1,7 +1,11 @@
 //! The window's picture without a window: the same panels, laid out and painted by egui into a texture that is read
 //! back.
 
-use super::{Start, TickSource, ViewError, Viewer, dress, pixels, theme};
+use super::{
+    Start, TickSource, ViewError, Viewer, dress,
+    film::{Film, PERIOD},
+    pixels, theme,
+};
 use crate::{
     dataset::replace_file,
     draw::canvas::encode_png,
@@ -63,23 +67,59 @@ pub fn render_state(context: &Context) -> Result<RenderState, ViewError> {
     })
 }
 
+/// A viewer without a window, that is drawn as `picture` says.
+struct Stage {
+    context: Arc<Context>,
+    render: RenderState,
+    egui: egui::Context,
+    viewer: Viewer,
+}
+
+impl Stage {
+    /// Opens `start` and begins the motion.
+    fn new(start: &Start, picture: &Picture) -> Result<Self, ViewError> {
+        let context = Arc::new(Context::open(AdapterChoice::Any)?);
+        let render = render_state(&context)?;
+        let egui = egui::Context::default();
+        egui.set_theme(if picture.dark { Theme::Dark } else { Theme::Light });
+        dress(&egui);
+        let mut viewer = Viewer::new(Arc::clone(&context), render.clone(), TickSource::Steps, PathBuf::from("."))?;
+        viewer.start(start, &egui);
+        viewer.wait();
+        if let Some(error) = viewer.error() {
+            return Err(ViewError::Open(error.to_owned()));
+        }
+        viewer.begin_motion(picture.motion.as_deref()).map_err(ViewError::Open)?;
+        Ok(Self { context, render, egui, viewer })
+    }
+}
+
+/// Opens `start`, plays its motion, and writes the 3-D picture over time to `path`: a GIF where the name ends so, else a
+/// folder of PNG files. Returns how many stills there are.
+///
+/// # Errors
+/// When there is no device, `start` cannot be opened or has no motion, or the film not be written.
+pub fn video(start: &Start, picture: &Picture, path: &Path) -> Result<usize, ViewError> {
+    let Stage { egui, mut viewer, .. } = Stage::new(start, picture)?;
+    let none = || ViewError::Open("there is no motion to show: give the scene one, or take a picture".into());
+    let (_, duration) = viewer.time_in_motion().ok_or_else(none)?;
+    let mut film = Film::begin(path.to_owned(), || ()).map_err(ViewError::Open)?;
+    let stills = (duration / PERIOD).round() as usize;
+    for _ in 0..stills {
+        viewer.advance(PERIOD, &egui);
+        let size = picture.size.map(|side| side as u32);
+        film.take(viewer.picture(size, &egui.style_of(egui.theme()).visuals)?);
+    }
+    let written = film.end().wait().map_err(ViewError::Open)?;
+    written.map(|_| stills).map_err(ViewError::Frame)
+}
+
 /// Opens `start`, plays until the picture's instant, and writes the window as it is then to the PNG file `path`.
 ///
 /// # Errors
 /// When there is no device, `start` cannot be opened, or the file not be written.
 pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), ViewError> {
-    let context = Arc::new(Context::open(AdapterChoice::Any)?);
-    let render = render_state(&context)?;
-    let egui = egui::Context::default();
-    egui.set_theme(if picture.dark { Theme::Dark } else { Theme::Light });
-    dress(&egui);
-    let mut viewer = Viewer::new(Arc::clone(&context), render.clone(), TickSource::Steps, PathBuf::from("."))?;
-    viewer.start(start, &egui);
-    viewer.wait();
-    if let Some(error) = viewer.error() {
-        return Err(ViewError::Open(error.to_owned()));
-    }
-    viewer.begin_motion(picture.motion.as_deref()).map_err(ViewError::Open)?;
+    let Stage { context, render, egui, mut viewer } = Stage::new(start, picture)?;
     viewer.advance(FRAME, &egui);
     for _ in 0..(picture.time / FRAME).ceil() as usize {
         if viewer.time_in_motion().is_some_and(|(time, duration)| time < picture.time.min(duration) - 0.5 * FRAME) {
@@ -99,8 +139,13 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
         output.append(egui.run_ui(input, |ui| viewer.ui(ui)));
     }
     let (size, bytes) = paint(&context, &render, &egui, output, picture)?;
+    write_picture(path, size, &bytes)
+}
+
+/// Writes a picture of `size` pixels to the PNG file `path`: red, green, blue, opacity of each.
+pub(super) fn write_picture(path: &Path, size: [u32; 2], bytes: &[u8]) -> Result<(), ViewError> {
     let written =
-        replace_file(path, |file| encode_png(file, size, png::ColorType::Rgba, &bytes).map_err(io::Error::other));
+        replace_file(path, |file| encode_png(file, size, png::ColorType::Rgba, bytes).map_err(io::Error::other));
     written.map_err(|error| ViewError::Write { path: path.to_owned(), reason: error.to_string() })
 }
 

@@ -11,7 +11,8 @@ use super::{
     number,
     plots::{self, Plots},
     session::Session,
-    steering, steps,
+    steering::{self, Side},
+    steps,
     theme::{
         BAR_MARGIN, CONTROLS_RANGE, CONTROLS_WIDTH, GAP, GROUP_GAP, LEAST_MOTION, LONE_BUTTON, MESSAGE_WIDTH,
         MOTION_WIDTH, NAME_SHARE, NARROW, PANEL_MARGIN, PAUSE_WIDTH, PLOTS_RANGE, PROGRESS, PROGRESS_HEIGHT,
@@ -19,18 +20,21 @@ use super::{
     },
 };
 use crate::{
+    dataset::replace_file,
     gpu::ADAPTER_VARIABLE,
     render::{flags::Flags, setup::border_stiffness, trace::Tick},
 };
 use eframe::egui::{
-    self, Align, Button, CentralPanel, Color32, Frame, Grid, Label, Layout, Panel, ProgressBar, RichText, ScrollArea,
-    Slider, TextStyle, Ui, vec2,
+    self, Align, Button, CentralPanel, CollapsingHeader, Color32, Frame, Grid, Key, Label, Layout, Modifiers, Panel,
+    ProgressBar, RichText, ScrollArea, Slider, TextStyle, Ui, vec2,
 };
-use std::path::Path;
+use std::{io::Write, path::Path};
 
 impl Viewer {
     /// The whole window.
     pub fn ui(&mut self, ui: &mut Ui) {
+        self.name_window(ui.ctx());
+        self.keys(ui);
         let dropped = ui.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
         if let Some(path) = dropped {
             self.open_file(&path, &ui.ctx().clone());
@@ -49,6 +53,54 @@ impl Viewer {
         self.complaint(ui);
     }
 
+    /// Gives the window the name of what is open, with a mark where it was changed and not saved.
+    fn name_window(&mut self, ctx: &egui::Context) {
+        let name = self.session.as_ref().map(|session| {
+            let (loaded, mark) = (&session.loaded, if self.is_unsaved { "*" } else { "" });
+            let path = loaded.file.as_deref().or(loaded.scene.as_ref().map(|scene| &*scene.path));
+            let file = path.and_then(Path::file_name).map_or(loaded.name.clone().into(), |file| file.to_string_lossy());
+            format!("{mark}{file} - haptize")
+        });
+        let name = name.unwrap_or_else(|| "haptize".into());
+        if self.title != name {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(name.clone()));
+            self.title = name;
+        }
+    }
+
+    /// Does what keys ask for, unless something is typed.
+    fn keys(&mut self, ui: &Ui) {
+        if ui.memory(|memory| memory.focused().is_some()) {
+            return;
+        }
+        let asks = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
+        if asks(Modifiers::COMMAND, Key::O) {
+            self.files.toggle();
+        }
+        if asks(Modifiers::COMMAND, Key::S) {
+            self.save();
+        }
+        if asks(Modifiers::COMMAND, Key::Q) {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        for (key, side) in [(Key::Num1, Side::Front), (Key::Num2, Side::Right), (Key::Num3, Side::Top)] {
+            if asks(Modifiers::NONE, key) {
+                self.scene.look_from(side);
+            }
+        }
+        if asks(Modifiers::NONE, Key::Num5) {
+            self.scene.reset_view();
+        }
+        let Some(session) = &self.session else { return };
+        if asks(Modifiers::NONE, Key::Num4) {
+            self.scene.fit(&session.loaded);
+        }
+        // Where a device leads, the space bar is its dead-man key.
+        if session.lead.is_none() && asks(Modifiers::NONE, Key::Space) {
+            session.feel.guide().toggle();
+        }
+    }
+
     /// Title, opening, motions, theme. In a narrow window the name and the motion's slider make room for all that is
     /// beside them.
     fn bar(&mut self, ui: &mut Ui) {
@@ -59,9 +111,7 @@ impl Viewer {
                 if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text("Colours of the window").clicked() {
                     ui.ctx().set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
                 }
-                if ui.button("Reset view").on_hover_text("Or double-click the scene").clicked() {
-                    self.scene.reset_view();
-                }
+                ui.menu_button("View", |ui| self.views(ui));
                 let shows_steps = &mut self.shows_steps;
                 let menu = ui.menu_button("Help", |ui| {
                     help(ui);
@@ -71,6 +121,30 @@ impl Viewer {
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.opening_and_motions(ui, name_width));
             });
         });
+    }
+
+    /// Whence the scene is seen.
+    fn views(&mut self, ui: &mut Ui) {
+        for (name, side) in [("Front", Side::Front), ("Right", Side::Right), ("Top", Side::Top)] {
+            if ui.button(name).clicked() {
+                self.scene.look_from(side);
+            }
+        }
+        if let (true, Some(session)) = (ui.button("Fit object and tip").clicked(), &self.session) {
+            self.scene.fit(&session.loaded);
+        }
+        if ui.button("Reset").on_hover_text("Or double-click the scene").clicked() {
+            self.scene.reset_view();
+        }
+        ui.separator();
+        let where_to = "Into the folder that Open… shows";
+        if ui.button("Save picture").on_hover_text(where_to).clicked() {
+            self.save_picture(&ui.visuals().clone());
+        }
+        let film = if self.film.is_some() { "Stop recording" } else { "Record a GIF" };
+        if ui.button(film).on_hover_text(where_to).clicked() {
+            self.toggle_film(&ui.ctx().clone());
+        }
     }
 
     fn opening_and_motions(&mut self, ui: &mut Ui, name_width: f32) {
@@ -83,7 +157,14 @@ impl Viewer {
             self.files.toggle();
         }
         let computed = self.session.as_ref().is_some_and(|session| session.loaded.report.is_some());
-        if computed && ui.button("Save dataset").on_hover_text("Into the folder that Open… shows").clicked() {
+        let what = match () {
+            () if self.is_unsaved => Some(("Save scene", "Into its file; its comments stay")),
+            () if computed => Some(("Save dataset", "Into the folder that Open… shows")),
+            () => None,
+        };
+        if let Some((what, how)) = what
+            && ui.button(what).on_hover_text(how).clicked()
+        {
             self.save();
         }
         ui.separator();
@@ -105,6 +186,10 @@ impl Viewer {
                 };
                 faults(ui, session);
                 felt(ui, session, touched);
+                if self.film.is_some() {
+                    ui.separator();
+                    ui.colored_label(ui.visuals().error_fg_color, RichText::new("recording").small());
+                }
                 self.progress_or_punctuality(ui);
                 ui.separator();
             }
@@ -159,7 +244,7 @@ impl Viewer {
         let Some(session) = &mut self.session else { return };
         let size = ui.available_size();
         let side = Frame::new().fill(ui.visuals().panel_fill).inner_margin(PANEL_MARGIN);
-        let mut bake = false;
+        let (mut bake, mut edit) = (false, None);
         let share = |length: f32, [least, greatest]: [f32; 2]| (SIDE_SHARE * length).clamp(least, greatest);
         let below = share(size.y, PLOTS_RANGE);
         // In a narrow window the plots get its whole width, in a wide one C-space gets its whole height.
@@ -175,6 +260,11 @@ impl Viewer {
             .size_range(CONTROLS_RANGE)
             .show(ui, |ui| {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+                    if let Some(placement) = &mut self.scene.placement {
+                        let q = session.feel.guide().goal();
+                        let place = CollapsingHeader::new("Place the object").show(ui, |ui| placement.show(ui, &q));
+                        edit = place.body_returned.flatten();
+                    }
                     let (controls, loaded) = (&mut session.controls, &session.loaded);
                     bake = controls.show(ui, loaded, session.advice.as_ref(), &mut self.scene.shown, &self.solvers);
                 });
@@ -192,8 +282,9 @@ impl Viewer {
             if *shows_steps {
                 *shows_steps = steps::show(ui, &session.loaded);
             }
-            if let Err(error) = self.scene.show(ui, &session.loaded, &session.feel, session.history.last()) {
-                self.error = Some(not_drawn(error));
+            match self.scene.show(ui, &session.loaded, &session.feel, session.history.last()) {
+                Ok(moved) => edit = edit.or(moved),
+                Err(error) => self.error = Some(not_drawn(error)),
             }
         });
         self.solver = session.controls.solver.clone();
@@ -202,7 +293,10 @@ impl Viewer {
             Some(Err(error)) => self.error = Some(error),
             None => {}
         }
-        if let (true, Some(scene)) = (bake, session.controls.scene.clone()) {
+        let Some(scene) = session.controls.scene.clone() else { return };
+        if let Some(edit) = edit {
+            self.begin(Task::Edit(scene, edit), &ui.ctx().clone());
+        } else if bake {
             let surface = session.loaded.dataset.surface.clone();
             self.begin(Task::Bake(scene, surface), &ui.ctx().clone());
         }
@@ -261,13 +355,26 @@ impl Viewer {
 
     fn save(&mut self) {
         let Some(session) = &self.session else { return };
-        let file = self.files.fresh(&session.loaded.name, "haptize");
-        match session.loaded.dataset.save(&file) {
-            Ok(()) => {
+        let saved = match (&session.loaded.scene, &session.loaded.report) {
+            (Some(scene), _) if self.is_unsaved => {
+                let written = replace_file(&scene.path, |file| file.write_all(scene.text.as_bytes()));
+                written.map(|()| scene.path.clone()).map_err(|error| {
+                    format!("cannot write {}: {error}; free some space or choose another folder", scene.path.display())
+                })
+            }
+            (_, Some(_)) => {
+                let file = self.files.fresh(&session.loaded.name, "haptize");
+                session.loaded.dataset.save(&file).map(|()| file).map_err(|error| error.to_string())
+            }
+            _ => return,
+        };
+        match saved {
+            Ok(file) => {
+                self.is_unsaved = false;
                 self.notice = Some(Notice::new(format!("wrote {}", file.display())));
                 self.files.remember(&file);
             }
-            Err(error) => self.error = Some(error.to_string()),
+            Err(error) => self.error = Some(error),
         }
     }
 }

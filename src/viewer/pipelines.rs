@@ -19,6 +19,7 @@ const SHAPES: &str = include_str!("../../shaders/draw_shapes.wgsl");
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub struct View {
     pub clip: [[f32; 4]; 4],
+    pub object: [[f32; 4]; 4],
     pub eye: [f32; 4],
     pub light: [f32; 4],
     pub stops: [[f32; 4]; 5],

@@ -14,6 +14,8 @@ pub struct Readout<'a> {
     pub tick: &'a Tick,
     /// Where the tip is (m).
     pub tip: Option<DVec3>,
+    /// Distance of the tip from the surface at rest, negative inside (m); none where it is not known.
+    pub gap: Option<f64>,
     /// Sum of the forces of the object on the arm (N); none where they are not known.
     pub force: Option<DVec3>,
     /// The vertex that was clicked.
@@ -21,7 +23,7 @@ pub struct Readout<'a> {
 }
 
 /// Widths of name, numbers and unit (letters); of a value, and of three of a vector.
-const NAME: usize = 10;
+const NAME: usize = 11;
 const UNIT: usize = 4;
 const VALUE: usize = 8;
 const THREE: usize = 21;
@@ -40,6 +42,9 @@ impl Readout<'_> {
         }
         if let Some(tip) = self.tip {
             line(ui, format!("{:<NAME$}{:>THREE$} mm", "tip", three(1e3 * tip, 1)));
+        }
+        if let Some(gap) = self.gap {
+            line(ui, format!("{:<NAME$}{:>THREE$} mm", "to surface", plain(1e3 * gap, 1)));
         }
         let force = |ui: &mut Ui, name: &str, force: DVec3| {
             let size = plain(force.length(), 2);
@@ -63,5 +68,5 @@ fn plain(value: f64, decimals: usize) -> String {
 }
 
 fn three(vector: DVec3, decimals: usize) -> String {
-    vector.to_array().map(|value| plain(value, decimals)).join(" ")
+    vector.to_array().map(|value| format!("{:>7}", plain(value, decimals))).concat()
 }

@@ -5,15 +5,18 @@ use super::{
     background::Following,
     body::Body,
     feel::Feel,
+    film::Still,
     in_picture,
     links::Links,
     loaded::Loaded,
     on_screen, overlay,
     palette::{self, Palette, figure_colour},
+    pixels,
+    placing::{Edit, ObjectPlace, tip_gap},
     probe::pick,
     readout::Readout,
     shapes::Shape,
-    steering::Steering,
+    steering::{Side, Steering},
     theme::{FINE_GAP, GROUP_GAP},
     view_renderer::{Look, Quantity, ViewRenderer},
 };
@@ -23,16 +26,16 @@ use crate::{
         camera::Camera,
         solid::{self, Cone},
     },
-    gpu::Context,
+    gpu::{Context, GpuError},
     proxy::{Chain, Pose, tip},
     render::{session::Latest, trace::Tick},
     scene::GraphicsEffects,
 };
 use eframe::{
-    egui::{self, Color32, Rect, Sense, Ui, UiBuilder, pos2},
+    egui::{self, Color32, Rect, Sense, Ui, UiBuilder, Visuals, pos2, vec2},
     egui_wgpu::RenderState,
 };
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
 /// The parts of the scene that the user wants to see.
@@ -62,6 +65,8 @@ pub struct SceneView {
     redrawing: Following<GraphicsEffects, Result<Option<Body>, Error>>,
     pose: Pose,
     ghost: Pose,
+    /// Where the object is to be moved, if it can be.
+    pub placement: Option<ObjectPlace>,
     /// The vertex that was clicked.
     probed: Option<usize>,
     /// The parts that are shown.
@@ -110,6 +115,7 @@ impl SceneView {
             pose: Pose::default(),
             ghost: Pose::default(),
             shown: Shown { edges: true, forces: true, ghost: true, quantity: Quantity::Displacement },
+            placement: None,
             probed: None,
             extent: NO_EXTENT,
             ground: 0.0,
@@ -119,7 +125,15 @@ impl SceneView {
     /// Takes the proxy of `loaded` and its object, `body`, and looks at them.
     pub fn open(&mut self, loaded: &Loaded, body: Option<Body>) {
         (self.body, self.redrawing) = (body, Following::new(Some(loaded.tuning().graphics)));
+        self.placement = ObjectPlace::new(loaded);
         self.look_at(loaded);
+    }
+
+    /// As [`SceneView::open`], but one goes on looking from where one looks.
+    pub fn change(&mut self, loaded: &Loaded, body: Option<Body>) {
+        let camera = self.steering.camera;
+        self.open(loaded, body);
+        self.steering.camera = camera;
     }
 
     /// Takes the proxy of `loaded` and looks at it. Where there was nothing before, its object follows.
@@ -212,16 +226,25 @@ impl SceneView {
     }
 
     /// Shows the scene in all of `ui`, with the numbers of `tick`, and lets pointer and keys lead the hand of `feel`.
+    /// Answers with a change that the pointer made of the scene.
     ///
     /// # Errors
     /// When the device fails.
-    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, feel: &Feel, tick: Option<&Tick>) -> Result<(), ViewError> {
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        loaded: &Loaded,
+        feel: &Feel,
+        tick: Option<&Tick>,
+    ) -> Result<Option<Edit>, ViewError> {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, "3-D scene"));
         // Not longer than that: the hand's thread waits for its guide, and to draw takes long.
         let mut guide = feel.guide();
         guide.shown_in(ui.ctx());
-        self.steering.steer(ui, &response, rect, &loaded.setup.chain, &self.pose, &mut guide);
+        let placement = self.placement.as_mut().map(|placement| &mut placement.motion);
+        let arm = (&loaded.setup.chain, &self.pose);
+        self.steering.steer(ui, &response, rect, arm, &mut guide, placement);
         drop(guide);
         if response.clicked()
             && let (Some(pointer), Some(body), Some(object)) =
@@ -247,17 +270,65 @@ impl SceneView {
             ui.style_mut().interaction.selectable_labels = false;
             if let Some(tick) = tick {
                 let (axes, chain) = (&loaded.dataset.grid.axes, &loaded.setup.chain);
-                let force = self.touched().map(|(_, force)| force);
-                Readout { axes, tick, tip: self.tip(chain), force, probe }.show(ui);
+                let (tip, force) = (self.tip(chain), self.touched().map(|(_, force)| force));
+                let gap = tip.and_then(|tip| tip_gap(loaded, tip, self.frame()));
+                Readout { axes, tick, tip, gap, force, probe }.show(ui);
             }
             overlay::keys(ui, &palette, self.body.as_ref(), forces, self.shows_ghost());
         });
-        Ok(())
+        let moved = self.placement.filter(|_| response.drag_stopped());
+        Ok(moved.and_then(|placement| placement.edit()))
+    }
+
+    /// From where the object is to where it is being moved.
+    fn frame(&self) -> DAffine3 {
+        self.placement.as_ref().map_or(DAffine3::IDENTITY, ObjectPlace::frame)
     }
 
     /// Looks from where one looked first.
     pub fn reset_view(&mut self) {
         self.steering.reset();
+    }
+
+    /// Looks from `side`.
+    pub fn look_from(&mut self, side: Side) {
+        self.steering.look_from(side);
+    }
+
+    /// Sees the object of `loaded` and the tip of the arm whole, and no more.
+    pub fn fit(&mut self, loaded: &Loaded) {
+        let object = loaded.setup.object.iter().flat_map(|object| &object.rest).copied();
+        let places = || object.clone().map(|place| self.frame().transform_point3(place));
+        let places = || places().chain(self.tip(&loaded.setup.chain));
+        if let (Some(low), Some(high)) = (places().reduce(DVec3::min), places().reduce(DVec3::max)) {
+            self.steering.fit(low.midpoint(high), 0.5 * low.distance(high));
+        }
+    }
+
+    /// Size of the picture as it was drawn last (pixels).
+    #[must_use]
+    pub fn size(&self) -> Option<[u32; 2]> {
+        self.stage.picture().map(|picture| [picture.width(), picture.height()])
+    }
+
+    /// The picture as it was drawn last. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn still(&self) -> Result<Option<Still>, GpuError> {
+        let read =
+            |picture: &wgpu::Texture| Ok(([picture.width(), picture.height()], pixels::read(&self.context, picture)?));
+        self.stage.picture().map(read).transpose()
+    }
+
+    /// Draws a picture of `size` pixels for itself, without anything on top. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn picture(&mut self, size: [u32; 2], loaded: &Loaded, visuals: &Visuals) -> Result<Option<Still>, GpuError> {
+        let rect = Rect::from_min_size(pos2(0.0, 0.0), vec2(size[0] as f32, size[1] as f32));
+        self.draw(rect, 1.0, &palette::of(visuals), &loaded.setup.chain)?;
+        self.still()
     }
 
     fn draw(
@@ -266,7 +337,7 @@ impl SceneView {
         pixels_per_point: f32,
         palette: &Palette,
         chain: &Chain,
-    ) -> Result<egui::TextureId, ViewError> {
+    ) -> Result<egui::TextureId, GpuError> {
         let size = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
         let extremes = self.body.as_ref().map_or([0.0; 2], |body| body.extremes);
         let top = match self.shown.quantity {
@@ -278,6 +349,7 @@ impl SceneView {
             quantity: self.shown.quantity,
             colour_top: top as f32,
             edge_width: if self.shown.edges { pixels_per_point } else { 0.0 },
+            object: self.frame(),
             ground: (self.ground as f32, figure_colour(palette.shadow).channels()),
         };
         let (shapes, casting) = self.shapes(palette, chain);

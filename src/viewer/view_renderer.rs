@@ -11,7 +11,7 @@ use crate::{
     gpu::{Context, GpuError},
     object::Object,
 };
-use glam::{Mat4, Vec3};
+use glam::{DAffine3, DMat4, Mat4, Vec3};
 use std::sync::Arc;
 
 /// The surface to draw: buffers on the device.
@@ -43,6 +43,8 @@ pub struct Look {
     pub colour_top: f32,
     /// Width of the triangles' edges (pixels); 0 for none.
     pub edge_width: f32,
+    /// From where the object is to where it is being moved.
+    pub object: DAffine3,
     /// Height of the ground, on which everything casts its shadow straight down (m), and the shadow's colour, 0 to 1.
     pub ground: (f32, [f32; 3]),
 }
@@ -125,6 +127,12 @@ impl ViewRenderer {
         })?;
         let unit_vertices = unit_shape.len() as u32;
         Ok(Self { context, surface, links, shapes, views, unit, unit_vertices, no_state, samples, targets: None })
+    }
+
+    /// The picture that was drawn last.
+    #[must_use]
+    pub fn picture(&self) -> Option<&wgpu::Texture> {
+        self.targets.as_ref().map(|targets| &targets.picture)
     }
 
     /// Draws one picture of `size` pixels and returns its texture; the texture is the same one until the size changes.
@@ -216,6 +224,7 @@ fn view(size: [u32; 2], camera: &Camera, look: &Look, surface: Option<&Surface>)
     };
     View {
         clip: camera.clip(f64::from(size[0]) / f64::from(size[1])).to_cols_array_2d(),
+        object: DMat4::from(look.object).as_mat4().to_cols_array_2d(),
         eye: camera.eye().as_vec3().extend(1.0).to_array(),
         light: light.extend(0.0).to_array(),
         stops: std::array::from_fn(stop),

@@ -62,6 +62,7 @@ pub fn open(start: Start, device: Option<DeviceChoice>) -> Result<(), ViewError>
         dress(&creation.egui_ctx);
         let folder = std::env::current_dir().unwrap_or_else(|_| ".".into());
         let mut viewer = Viewer::new(device, render, TickSource::Clock, folder)?;
+        viewer.keep_files();
         if let Some(hand) = hand {
             viewer.drive(hand);
         }

@@ -11,4 +11,5 @@ mod feel;
 mod looks;
 mod open;
 mod panels;
+mod placing;
 mod window;

@@ -1,7 +1,7 @@
 //! That every panel is there and answers.
 
 use super::window::{DEVICE_NAME, Window, small_scene};
-use eframe::egui::{Event, Rect, Theme, accesskit::Role, pos2, vec2};
+use eframe::egui::{Event, Key, Modifiers, Rect, Theme, accesskit::Role, pos2, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use haptize::viewer::{LEAST_WINDOW, Start};
 
@@ -87,7 +87,7 @@ fn nothing_overlaps_in_the_least_window_however_long_the_name_and_however_many_t
     };
     let bar =
         ["haptize", "Open…", "Save dataset", "Pointer", "Press", "Scrape", "Pause", "Time in the motion", " of 4.5 s"];
-    apart(&window, &[&bar[..], &["Help", "Reset view", "Dark"]].concat(), screen);
+    apart(&window, &[&bar[..], &["Help", "View", "Dark"]].concat(), screen);
     window.choose("Show", "status");
     window.harness.get_by_label("outside").scroll_to_me();
     window.harness.run_ok();
@@ -212,4 +212,62 @@ fn a_message_fades_by_itself() {
         window.harness.step();
     }
     assert!(!window.shows("viewer-trace.csv"), "the message stays");
+}
+
+#[test]
+fn keys_pause_open_and_look_from_several_sides() {
+    let mut window = Window::sphere();
+    window.click("Press");
+    window.pass(0.3);
+    assert!(window.shows("Pause"));
+    window.harness.key_press(Key::Space);
+    window.harness.run_ok();
+    assert!(!window.shows("Pause") && window.shows("Play"));
+    let mut seen = vec![window.picture_of("3-D scene")];
+    for key in [Key::Num1, Key::Num2, Key::Num3, Key::Num4] {
+        window.harness.key_press(key);
+        let picture = window.picture_of("3-D scene");
+        assert!(!seen.contains(&picture), "{key:?} shows nothing else");
+        seen.push(picture);
+    }
+    window.harness.key_press(Key::Num5);
+    assert!(window.picture_of("3-D scene") == seen[0], "the view is not as it was at first");
+    window.harness.key_press_modifiers(Modifiers { ctrl: true, command: true, ..Modifiers::NONE }, Key::O);
+    window.harness.run_ok();
+    assert!(window.shows("Open a scene or a dataset"));
+}
+
+#[test]
+fn the_scene_is_saved_as_a_picture_and_as_a_film() {
+    let mut window = Window::sphere();
+    window.click("Press");
+    window.pass(0.3);
+    let scene = window.harness.get_by_label("3-D scene").rect();
+    window.click("View");
+    window.click("Save picture");
+    let picture = image::open(window.folder.path().join("sphere.png")).unwrap();
+    assert!((picture.width() as f32 - 2.0 * scene.width()).abs() < 2.0);
+    window.click("View");
+    window.click("Record a GIF");
+    assert!(window.shows("recording"));
+    for _ in 0..10 {
+        window.advance(0.08);
+        window.harness.step();
+    }
+    window.click("View");
+    window.click("Stop recording");
+    let film = window.folder.path().join("sphere.gif");
+    for _ in 0..600 {
+        window.advance(0.02);
+        if film.exists() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    let mut decoder = gif::DecodeOptions::new().read_info(std::fs::File::open(film).unwrap()).unwrap();
+    let mut stills = 0;
+    while decoder.read_next_frame().unwrap().is_some() {
+        stills += 1;
+    }
+    assert!((8..=11).contains(&stills), "{stills} stills of ten");
 }
