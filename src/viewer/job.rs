@@ -31,6 +31,8 @@ use std::{
 pub enum Task {
     /// Open a scene, to be solved live, or a dataset.
     Open(PathBuf),
+    /// Open the dataset of a real object, and the scene of its twin.
+    OpenTwinned(PathBuf, PathBuf),
     /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again
     /// then.
     Bake(Arc<Scene>, Option<Surface>),
@@ -137,7 +139,9 @@ impl Job {
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
         let title = match &task {
-            Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
+            Task::Open(path) | Task::OpenTwinned(path, _) => {
+                format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display())
+            }
             Task::Bake(scene, _) => format!("Haptizing {}", scene.name),
         };
         let stop = Arc::new(AtomicBool::new(false));
@@ -217,6 +221,10 @@ fn run(
         Task::Open(path) => {
             let dataset = Dataset::load(&path)?;
             Loaded::new(dataset, None, Some(path.clone())).map_err(|error| format!("{}: {error}", path.display()))?
+        }
+        Task::OpenTwinned(path, twin) => {
+            let (dataset, twin) = (Dataset::load(&path)?, Scene::load(&twin)?);
+            Loaded::twinned(dataset, twin, path.clone()).map_err(|error| format!("{}: {error}", path.display()))?
         }
         Task::Bake(scene, surface) => bake((*scene).clone(), surface, solver, context, stop, progress)?,
     };
