@@ -12,6 +12,6 @@ out=out/real-objects
 mkdir -p "$out"
 
 "$haptize" gridize "$logs"/*.txt --columns datasets/instrument.toml --step 0.02 -o "$out/instrument.haptize" \
-    --held-out 0.1 --figures "$out/instrument"
+    --held-out 0.1 --within inf --figures "$out/instrument"
 cp "$out/instrument/torque.png" docs/figures/instrument-torque.png
 cp "$out/instrument/hysteresis.png" docs/figures/instrument-hysteresis.png

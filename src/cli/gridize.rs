@@ -85,8 +85,8 @@ pub struct Arguments {
     /// Smooth torques within their measured standard deviation first.
     #[arg(long)]
     smooth: bool,
-    /// Distance from the samples at which the measured region ends inside their convex hull, too, in spacings of the samples;
-    /// `inf` for the hull alone.
+    /// Distance from the samples at which the measured region ends inside their convex hull, too, in spacings of the samples,
+    /// and the diagonal of a grid cell at least; `inf` for the hull alone.
     #[arg(long, default_value_t = WITHIN, value_name = "SPACINGS", allow_negative_numbers = true)]
     within: f64,
     /// Measure how well the dataset predicts measurements: a second one is made without this fraction of the samples, and
@@ -217,7 +217,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         report,
         file: output.display().to_string(),
         source: source.kind,
-        within: arguments.within,
         seconds: started.elapsed().as_secs_f64(),
         import: source.import,
         left_out: source.left_out,
@@ -250,8 +249,6 @@ struct Gridized {
     file: String,
     /// `scan`, `simulated scan` or `import`.
     source: &'static str,
-    /// Distance from the samples at which the measured region ends, in their spacings (1).
-    within: f64,
     /// Wall time, and the part of it for reading (s).
     seconds: f64,
     #[serde(skip)]
@@ -480,8 +477,9 @@ impl Describe for IdentifiedFriction {
 
 impl Describe for Gridized {
     fn describe(&self, text: &mut Text) {
-        let Self { file, source, of, seconds, reading, import, left_out, within, .. } = self;
-        let GridizeReport { samples, merged, points, inside, contact_points, epsilon, far, spacing } = &self.report;
+        let Self { file, source, of, seconds, reading, import, left_out, .. } = self;
+        let GridizeReport { samples, merged, points, inside, contact_points, epsilon, far, distance, .. } =
+            &self.report;
         text.line(format_args!("{file}: {inside} grid points of {points} inside the measured region"));
         text.row("made from", format_args!("{samples} samples ({source}: {of})"));
         if *merged > 0 {
@@ -492,19 +490,17 @@ impl Describe for Gridized {
             _ => "N m or N",
         };
         if *far > 0 {
-            let mut spacings: Vec<String> = Vec::new();
-            for (spacing, axis) in spacing.iter().zip(&self.axes) {
-                let told = format!("{} {}", coarse(within * spacing), axis.unit);
-                if !spacings.contains(&told) {
-                    spacings.push(told);
+            let mut told: Vec<String> = Vec::new();
+            for (distance, axis) in distance.iter().zip(&self.axes) {
+                let own = format!("{} {}", coarse(*distance), axis.unit);
+                if !told.contains(&own) {
+                    told.push(own);
                 }
             }
+            let told = told.join(", ");
             text.row(
                 "far",
-                format_args!(
-                    "{far} grid points between the samples are left out: more than {within} spacings ({}) from any",
-                    spacings.join(", ")
-                ),
+                format_args!("{far} grid points between the samples are left out, more than {told} from any"),
             );
         }
         text.row("in contact", format_args!("{contact_points} points, torque above {} {unit}", coarse(*epsilon)));

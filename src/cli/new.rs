@@ -94,13 +94,24 @@ impl Example {
         }
     }
 
-    /// The command that the file `scene` is for.
-    fn next(self, scene: &Path) -> String {
+    /// The commands that the file `scene` is for, one after the other.
+    fn next(self, scene: &Path) -> Vec<String> {
         let file = shell::file(scene);
+        let stem = scene.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+        let beside = |end: &str| shell::file(Path::new(&format!("{stem}{end}"))).to_string();
+        let (log, dataset, twin) = (beside(".csv"), beside(".haptize"), beside("_twin.toml"));
         match self {
-            _ if self.is_scanned() => format!("haptize scan {file}"),
-            Self::Organ => format!("haptize play {file}"),
-            _ => format!("haptize bake {file}"),
+            // From joint torques to an object that is seen, and felt beyond what was measured.
+            Self::Sponge => vec![
+                format!("haptize scan {file}"),
+                format!("haptize gridize {log} --step 0.03"),
+                format!("haptize shape {log} --ground {SPONGE_GROUND}"),
+                format!("haptize twin {log} --ground {SPONGE_GROUND}"),
+                format!("haptize play {dataset} --twin {twin}"),
+            ],
+            _ if self.is_scanned() => vec![format!("haptize scan {file}")],
+            Self::Organ => vec![format!("haptize play {file}")],
+            _ => vec![format!("haptize bake {file}")],
         }
     }
 
@@ -108,6 +119,9 @@ impl Example {
         matches!(self, Self::Sponge | Self::SpongeFabric | Self::SpongeSide)
     }
 }
+
+/// Height of the ground on which the simulated sponge lies (m), which no torque tells.
+pub const SPONGE_GROUND: f64 = -0.05;
 
 /// Writes the scene, and the mesh that it reads. No file is replaced.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
@@ -140,13 +154,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
 struct Written {
     files: Vec<String>,
     #[serde(skip)]
-    next: String,
+    next: Vec<String>,
 }
 
 impl Describe for Written {
     fn describe(&self, text: &mut Text) {
         text.line(format_args!("wrote {}", self.files.join(" and ")));
-        text.line(format_args!("next: {}", self.next));
+        self.next.iter().for_each(|command| text.line(format_args!("next: {command}")));
     }
 }
 

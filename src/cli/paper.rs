@@ -6,17 +6,24 @@ use super::{
     bar::Bar,
     gridize::{self, Source},
     interrupt, motion,
+    new::SPONGE_GROUND,
     output::{self, Folder, Overwritten},
     played,
     report::{self, Describe, Report, Text},
     scan::{self, Course},
-    tell, watch,
+    tell,
+    twin::Twinned,
+    watch,
 };
 use crate::{
+    JointVector,
+    contact::{Model, Solver},
     dataset::{Dataset, replace_file},
     draw::canvas::Canvas,
-    gridize::{GridizeOptions, Interpolation, WITHIN},
-    paper::{Comparison, Scanned, Scans, Sphere, haptize, procedure, specimen},
+    gridize::{GridizeOptions, Interpolation},
+    object::Object,
+    paper::{Comparison, PressedTwin, Scanned, Scans, Sphere, haptize, hardest, procedure, specimen},
+    proxy::Chain,
     render::{
         setup::Setup,
         trace::{Summary, Trace},
@@ -33,6 +40,7 @@ use crate::{
     scene::{ScanScene, Scene},
     sweep::BackendChoice,
 };
+use glam::DVec3;
 use serde::Serialize;
 use std::{
     io::Write as _,
@@ -55,7 +63,7 @@ const STEP: f64 = 0.03;
 const INSTANTS: usize = 6;
 
 /// Files that it writes.
-const FILES: [&str; 27] = [
+const FILES: [&str; 28] = [
     "paper.haptize",
     "sponge.csv",
     "sponge.haptize",
@@ -63,6 +71,7 @@ const FILES: [&str; 27] = [
     "sponge_fabric.haptize",
     "sponge_side.csv",
     "sponge_side.haptize",
+    "sponge_twin.obj",
     "fig2-procedure.svg",
     "fig2-procedure.png",
     "fig3-cspace.png",
@@ -133,7 +142,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     files.extend(figures.sheet("fig4-gridization", &gridized(&bare.source.samples, &bare.dataset))?);
     files.extend(figures.sheet("fig5-press", &press::press(&pressed))?);
     files.extend(figures.picture("fig6-deformation", &object::object(&dataset, &setup.chain, &instants)?)?);
-    files.extend(figures.picture("fig7-sponge", &specimen(scans))?);
+    files.extend(figures.picture("fig7-sponge", &specimen(scans, &pressed_twin(folder, scans)?))?);
     files.extend(figures.sheet("fig8-scrape", &forces(scans))?);
     files.extend(
         figures
@@ -203,6 +212,23 @@ fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Arc<Trace>), Failure>
     Ok((setup, played.trace))
 }
 
+/// The twin of the bare block that was scanned in `folder`, where the arm pushes hardest.
+fn pressed_twin(folder: &Path, scans: Scans<'_>) -> Result<PressedTwin, Failure> {
+    let mesh = folder.join("sponge_twin.obj");
+    let twin = Twinned::new((&folder.join("sponge.csv"), Some(SPONGE_GROUND)), None, &mesh.with_extension("toml"))?;
+    let (object, chain) = (Object::build(&twin.scene.object)?, Chain::new(&twin.scene.proxy));
+    let q: Vec<JointVector> = hardest(scans.bare).into_iter().collect();
+    let model = Model::reaching(&object, &chain, twin.scene.contact, &q)?;
+    let mut solver = Solver::new(&model);
+    q.iter().for_each(|q| drop(solver.solve(q)));
+    let moved: Vec<DVec3> = solver.displacement().chunks_exact(3).map(DVec3::from_slice).collect();
+    Ok(PressedTwin {
+        nodes: object.rest.iter().zip(&moved).map(|(x, moved)| *x + *moved).collect(),
+        displacements: moved.iter().map(|moved| moved.length()).collect(),
+        triangles: object.triangles.clone(),
+    })
+}
+
 /// Draws the scrapes over both covers in one figure (Fig. 8).
 fn forces(scans: Scans<'_>) -> Canvas {
     let covers = [("bare (simulated)", scans.bare), ("under a fabric (simulated)", scans.fabric)];
@@ -268,7 +294,8 @@ impl Specimen {
             epsilon: source.epsilon,
             interpolation: Interpolation::Linear,
             smooth: false,
-            within: WITHIN,
+            // As in the paper the convex hull alone ends what was measured.
+            within: f64::INFINITY,
         };
         let (dataset, _) = source.gridize(&options)?;
         dataset.save(&folder.join(self.name).with_extension("haptize"))?;

@@ -15,6 +15,7 @@ use super::{
 use crate::{
     dataset::{Dataset, JointLabel, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
+    gridize::with_energy,
     render::{
         live::LiveScene,
         mcap,
@@ -25,7 +26,7 @@ use crate::{
         timing::Timing,
         trace::{Summary, Tick, Trace},
     },
-    report::FIGURES,
+    report::{FIGURES, twinned::TwinError, write_both},
     scene::Scene,
     sweep::{Clearance, thin_parts},
 };
@@ -47,10 +48,15 @@ Examples:
   haptize play sphere.haptize --motion session.mcap
   haptize play organ.toml                                nothing baked: contact is solved in every tick
   haptize play sphere.haptize --replay session.csv
-  haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize")]
+  haptize play sponge.haptize --motion scrape --beside sponge_fabric.haptize
+  haptize play sponge.haptize --twin sponge_twin.toml    the object is seen, and felt beyond what was measured")]
 pub struct Arguments {
     /// A dataset, or a scene: contact is then solved live, in every tick, by the law `rest`, and nothing is baked.
     dataset: PathBuf,
+    /// The scene that `haptize twin` made of the same scan: it is seen to deform, and answers where the dataset measured
+    /// nothing.
+    #[arg(long, value_name = "SCENE", conflicts_with = "beside")]
+    twin: Option<PathBuf>,
     /// Motion of the hand: `press` or `scrape` as in the scene, a CSV file of times (s) and joint coordinates, or joint
     /// states in MCAP, such as a session that --record wrote.
     #[arg(long, default_value = "press")]
@@ -105,13 +111,16 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
     let Outputs { filled, replaced } = Outputs::check(arguments, &folder)?;
     let live = live(arguments)?;
-    let dataset = Arc::new(match &live {
-        Some(scene) => scene.dataset(),
-        None => Dataset::load(&arguments.dataset)?,
+    let twin = arguments.twin.as_deref().map(|path| twin(path, live.is_some())).transpose()?;
+    let dataset = Arc::new(match (&live, &twin) {
+        (Some(scene), _) => scene.dataset(),
+        (None, Some(twin)) => twin.beside(with_energy(Dataset::load(&arguments.dataset)?)),
+        (None, None) => Dataset::load(&arguments.dataset)?,
     });
-    let setup = match &live {
-        Some(scene) => Setup::live(Arc::clone(scene), &dataset),
-        None => Setup::new(&dataset),
+    let setup = match (&live, &twin) {
+        (Some(scene), _) => Setup::live(Arc::clone(scene), &dataset),
+        (None, Some(twin)) => Setup::twinned(Arc::clone(twin), &dataset),
+        (None, None) => Setup::new(&dataset),
     };
     let mut setup = setup.map_err(|error| format!("{}: {error}", arguments.dataset.display()))?;
     if arguments.passive_gains {
@@ -123,7 +132,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let notes =
         live.iter().filter_map(|scene| scene.notice()).chain(setup.advice.as_ref().map(|advice| advice.text.as_str()));
     notes.for_each(|note| tell(format_args!("haptize: note: {note}")));
-    let clearance = if live.is_some() { None } else { warn_of_free_space(&dataset)? };
+    let clearance = if setup.haptics.source().live().is_some() { None } else { warn_of_free_space(&dataset)? };
     let open_beside = |path| -> Result<Beside<'_>, Failure> {
         let motion = motion::named(&setup, &dataset, &arguments.motion, arguments.topic.as_deref())?;
         Beside::open(path, &setup, motion)
@@ -157,6 +166,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => thin_parts::told(&dataset.provenance.notices),
     };
     files.extend(write(&setup, &dataset, &played, &folder)?);
+    let twin = setup.haptics.source().twinned().map(|field| TwinError::along(field, trace));
+    if let Some(twin) = &twin {
+        files.extend(write_both(&folder, "twin", &twin.draw(trace))?);
+    }
     let mut felt = PlaybackReport::new(&arguments.dataset, &dataset, &setup, &played.trace);
     if let Some(beside) = beside {
         felt.beside(beside, played.trace.summary().seconds)?;
@@ -182,6 +195,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         device: arguments.device.as_ref().map(|device| Driven { name: device.to_string(), tally }),
         clearance,
         thin_part,
+        twin,
         felt,
         recording: recorded.map(|file| Record {
             file: file.display().to_string(),
@@ -215,6 +229,9 @@ struct PlayedSession {
     /// What to tell of a part of the object that the arm got through, or gets through somewhere in the dataset.
     #[serde(skip_serializing_if = "Option::is_none")]
     thin_part: Option<String>,
+    /// What the twin of a real object errs by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    twin: Option<TwinError>,
     #[serde(flatten)]
     felt: PlaybackReport,
     files: Vec<String>,
@@ -265,6 +282,13 @@ impl Describe for PlayedSession {
             text.row("border", format_args!("holds the device with the coupling's stiffness Kvc: {stiffness}"));
         }
         self.thin_part.iter().for_each(|told| text.row("note", told));
+        if let Some(TwinError { factor, rms, .. }) = &self.twin {
+            let Summary { twin_ticks, twin_alone, .. } = &self.summary;
+            text.row("twin", format_args!("answers in {twin_ticks} ticks, {twin_alone} of these alone"));
+            let error =
+                rms.map_or(String::new(), |rms| format!("; along this way it errs by {:.1} % rms", 100.0 * rms));
+            text.row("", format_args!("times {factor:.3} it meets what was measured at the border{error}"));
+        }
         self.felt.describe(text);
         if let Some(Fault { time, reason }) = &self.fault {
             let remedy = "play again to clear it";
@@ -430,6 +454,17 @@ fn live(arguments: &Arguments) -> Result<Option<Arc<LiveScene>>, Failure> {
     Ok(Some(Arc::new(live?)))
 }
 
+/// The scene at `path`, the twin of a dataset unless the session `is_live`, prepared to be solved live.
+fn twin(path: &Path, is_live: bool) -> Result<Arc<LiveScene>, Failure> {
+    if is_live {
+        return Err("--twin is of datasets of real objects: a scene is solved everywhere".into());
+    }
+    if !Scene::is_at(path) {
+        return Err(format!("{}: a twin is a scene, whose name ends in .toml", path.display()).into());
+    }
+    Ok(Arc::new(LiveScene::new(Scene::load(path)?)?))
+}
+
 /// Returns which of the files that a session writes are there already.
 struct Outputs {
     filled: Folder,
@@ -439,7 +474,8 @@ struct Outputs {
 impl Outputs {
     /// Checks before anything is played that no output destroys an input, or another output.
     fn check(arguments: &Arguments, folder: &Path) -> Result<Self, Failure> {
-        let read = [&arguments.dataset].into_iter().chain(&arguments.beside).chain(&arguments.replay);
+        let read =
+            [&arguments.dataset].into_iter().chain(&arguments.twin).chain(&arguments.beside).chain(&arguments.replay);
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).chain([Path::new(&arguments.motion)]).collect();
         let filled = Folder::check(folder, FILES.into_iter().chain(FIGURES), inputs.clone())?;
         let record = arguments.record.as_ref().map(|file| output::check(file, Content::Log, inputs));

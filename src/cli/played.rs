@@ -27,7 +27,7 @@ use std::{
 };
 
 /// Files beside [`report::FIGURES`].
-pub const FILES: [&str; 4] = [TICKS, "frames.csv", "jitter.svg", "jitter.png"];
+pub const FILES: [&str; 6] = [TICKS, "frames.csv", "jitter.svg", "jitter.png", "twin.svg", "twin.png"];
 
 /// File of the ticks.
 const TICKS: &str = "trace.csv";

@@ -16,7 +16,7 @@ use crate::{
     proxy::Chain,
     report::{PIXELS, scanned::stiffness},
     scene::{Material, Scene},
-    twin::{Modulus, Watched, twin_scene},
+    twin::{Approaches, Modulus, ScannedShape, Watched, twin_scene},
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -69,30 +69,49 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     for file in [&mesh, &picture] {
         output::check(file, Content::Product, [arguments.log.as_path()])?;
     }
-    let (approaches, scan, shape) = found(&arguments.log, arguments.ground)?;
-    write(&mesh, shape.obj().as_bytes())?;
-    let name = mesh.file_name().unwrap_or_default().to_string_lossy();
-    let of_modulus = |young: f64| {
-        let mesh = (mesh.as_path(), &*name);
-        twin_scene((&scan.text, &output), mesh, (&shape, &approaches), young, arguments.width)
-    };
-    let scene = of_modulus(YOUNG)?;
-    let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
-    let bar = Bar::new("rows", "{wide_bar} {pos}/{len} rows, {eta} left");
-    let mut progress = |done: usize, rows: usize| bar.set(done as u64, rows as u64, String::new());
-    let watched = &mut Watched { stop: interrupt::stop_flag(), progress: &mut progress };
-    let rows: Vec<JointVector> = approaches.contact.iter().map(|row| row.q).collect();
-    let mut model = Model::reaching(&object, &chain, scene.contact, &rows)?;
-    let modulus = Modulus::fit(&mut model, YOUNG, (&approaches, &shape), watched);
-    bar.finish();
-    interrupt::over();
-    let modulus = modulus.map_err(|error| error.within(arguments.log.display()))?;
-    let scene = of_modulus(modulus.young)?;
+    let Twinned { approaches, shape, modulus, scene } =
+        Twinned::new((&arguments.log, arguments.ground), arguments.width, &output)?;
     write(&picture, &stiffness(&shape, &modulus).pixels(PIXELS)?.png()?)?;
     import::write(&output, &scene.text)?;
-    let shape = Found::new((&approaches, chain.nodes.len()), &shape, &mesh, &picture);
+    let nodes = Chain::new(&scene.proxy).nodes.len();
+    let shape = Found::new((&approaches, nodes), &shape, &mesh, &picture);
     let (poisson, width) = given(&scene);
     Report::new(&Twin { scene: output.display().to_string(), modulus, poisson, width, shape })
+}
+
+/// What explains a scan.
+pub struct Twinned {
+    approaches: Approaches,
+    shape: ScannedShape,
+    modulus: Modulus,
+    /// With the modulus that was found.
+    pub scene: Scene,
+}
+
+impl Twinned {
+    /// Explains `log` over a ground at a height (m) with a skin of `width` (m), as the scene `output`, beside which the mesh is
+    /// written. The scene is not.
+    pub fn new((log, ground): (&Path, Option<f64>), width: Option<f64>, output: &Path) -> Result<Self, Failure> {
+        let (approaches, scan, shape) = found(log, ground)?;
+        let mesh = output.with_extension("obj");
+        write(&mesh, shape.obj().as_bytes())?;
+        let name = mesh.file_name().unwrap_or_default().to_string_lossy();
+        let of_modulus =
+            |young: f64| twin_scene((&scan.text, output), (&mesh, &*name), (&shape, &approaches), young, width);
+        let scene = of_modulus(YOUNG)?;
+        let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
+        let bar = Bar::new("rows", "{wide_bar} {pos}/{len} rows, {eta} left");
+        let mut progress = |done: usize, rows: usize| bar.set(done as u64, rows as u64, String::new());
+        let watched = &mut Watched { stop: interrupt::stop_flag(), progress: &mut progress };
+        let rows: Vec<JointVector> = approaches.contact.iter().map(|row| row.q).collect();
+        let mut model = Model::reaching(&object, &chain, scene.contact, &rows)?;
+        let modulus = Modulus::fit(&mut model, YOUNG, (&approaches, &shape), watched);
+        bar.finish();
+        interrupt::over();
+        let modulus = modulus.map_err(|error| error.within(log.display()))?;
+        let scene = of_modulus(modulus.young)?;
+        Ok(Self { approaches, shape, modulus, scene })
+    }
 }
 
 /// Poisson's ratio of the object of `scene` (1), and the width of its skin (m; see [`crate::scene::SkinSpec`]).

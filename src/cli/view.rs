@@ -19,6 +19,7 @@ use std::path::PathBuf;
 Examples:
   haptize view                           the sphere of the demo
   haptize view sphere.haptize
+  haptize view sponge.haptize --twin sponge_twin.toml
   haptize view touch.haptize --device touch --hold-key
   haptize view datasets/organ.toml       nothing baked: contact is solved in every tick
   haptize view sphere.haptize --screenshot window.png --motion scrape --time 2.5 --dark
@@ -29,6 +30,10 @@ pub struct Arguments {
     /// A dataset, or a scene, whose contact is solved live, in every tick, by the law `rest`; without one the example
     /// sphere, which is baked first.
     file: Option<PathBuf>,
+    /// The scene that `haptize twin` made of the same scan as the dataset: it is drawn, and answers where the dataset
+    /// measured nothing.
+    #[arg(long, value_name = "SCENE", requires = "file")]
+    twin: Option<PathBuf>,
     /// A real device leads the arm instead of the pointer: KIND or KIND:PLACE, as `haptize device list` shows it.
     #[arg(long, value_name = "NAME", conflicts_with = "drawn")]
     device: Option<Address>,
@@ -76,7 +81,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let (hold_key, stop) = (arguments.hold_key, interrupt::stop_flag_of_device());
         DeviceChoice { address, hold_key, stop }
     });
-    let start = arguments.file.clone().map_or(Start::Sphere, Start::File);
+    let start = match (arguments.file.clone(), arguments.twin.clone()) {
+        (Some(file), Some(twin)) => Start::Twinned(file, twin),
+        (Some(file), None) => Start::File(file),
+        (None, _) => Start::Sphere,
+    };
     let picture = Picture {
         size: arguments.size,
         dark: arguments.dark,
@@ -98,7 +107,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if !file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
         return Err(format!("{}: the picture is a PNG file: give a name that ends in .png", file.display()).into());
     }
-    let replaced = output::check(file, Content::Product, arguments.file.as_deref())?;
+    let replaced =
+        output::check(file, Content::Product, arguments.file.iter().chain(&arguments.twin).map(PathBuf::as_path))?;
     if !(0.0..=60.0).contains(&arguments.time) {
         return Err(format!("cannot play {} s: give --time from 0 to 60", arguments.time).into());
     }

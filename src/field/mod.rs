@@ -102,6 +102,8 @@ pub struct Sample {
     pub energy: f64,
     /// Factor on interpolated contact forces, 0 to 1, so that they begin at the boundary and fade with the torque.
     pub share: f64,
+    /// Part of it that the twin of a real object answers, 0 to 1; zero where there is none.
+    pub twin: f64,
     /// [`Flags::OUTSIDE`], [`Flags::ABSENT`], [`Flags::UNCONVERGED`], [`Flags::LAYER`].
     pub flags: Flags,
 }

@@ -93,6 +93,7 @@ impl Around {
             contact_nodes: if contact { self.contact_nodes } else { 0 },
             energy,
             share: self.share * self.fade,
+            twin: 0.0,
             flags,
         }
     }

@@ -104,6 +104,11 @@ impl Cloud {
         position
     }
 
+    /// Length of a move by `steps`, one a joint, in scaled coordinates (1).
+    pub fn length(&self, steps: &[f64]) -> f64 {
+        steps.iter().zip(&self.scale).map(|(step, scale)| (step * scale).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// How far `length` in scaled coordinates is along each joint (rad or m).
     pub fn unscaled(&self, length: f64) -> Vec<f64> {
         self.scale.iter().take(self.joints).map(|scale| length / scale).collect()

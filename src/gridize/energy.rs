@@ -4,12 +4,17 @@
 //! Between neighbouring grid points of which one touches at least, `U_b - U_a = -h (tau_a + tau_b) / 2`. There are more
 //! such differences than points; U is their least squares, zero where nothing touches, by conjugate gradients. Where
 //! contact begins between a free point and one that touches, the trapezoid is too large: there the torque is taken to
-//! grow from zero as fast as it grows on to the next point behind, `U_b = tau_b^2 / (2 k)`.
+//! grow from zero as fast as it grows on to the next point behind, `U_b = tau_b^2 / (2 k)`. Points in contact that no free one
+//! is beside, in holes of what was measured, have a constant of their own, which the least torque among them tells.
+//!
+//! Where K_a is the greatest stiffness along joint a, a torque tau_a holds at least `tau_a^2 / (2 K_a)`: less, left by noise and
+//! by torques without a potential, would be interpolated more steeply than anything that was measured.
 
 use crate::{
     contact::{Status, linear::support::dot},
-    dataset::Grid,
+    dataset::{Dataset, Grid},
 };
+use std::collections::BTreeMap;
 
 /// Residual over that of zero energies at which U is as good as its torques, which are known to four digits at best
 /// (1).
@@ -23,8 +28,18 @@ struct Difference {
     value: f64,
 }
 
+/// `dataset` with an energy: its own, or that whose gradient is nearest to its torques.
+#[must_use]
+pub fn with_energy(dataset: Dataset) -> Dataset {
+    if dataset.energy.is_some() {
+        return dataset;
+    }
+    let energy = energy(&dataset.grid, &dataset.torque, &dataset.status);
+    Dataset { energy: Some(energy.into()), ..dataset }
+}
+
 /// Returns U at every point of `grid` (J); `torque` and `status` as in a dataset.
-pub(super) fn energy(grid: &Grid, torque: &[f64], status: &[u8]) -> Vec<f64> {
+fn energy(grid: &Grid, torque: &[f64], status: &[u8]) -> Vec<f64> {
     let touches = |point: usize| status[point] == Status::Contact as u8;
     let mut differences = Vec::new();
     for point in (0..grid.points()).filter(|&point| touches(point)) {
@@ -32,17 +47,65 @@ pub(super) fn energy(grid: &Grid, torque: &[f64], status: &[u8]) -> Vec<f64> {
             differences.extend(beside(grid, torque, status, point, axis));
         }
     }
-    if differences.iter().all(|difference| difference.first.is_some()) {
-        // Nothing is free: U is known but for a constant, which the least torque tells.
-        let size = |point: usize| norm(torque, grid.joints(), point);
-        let least = (0..grid.points()).filter(|&point| touches(point)).min_by(|&a, &b| size(a).total_cmp(&size(b)));
-        let onset = |point| {
-            let ways = (0..grid.joints()).flat_map(|axis| [(axis, 0), (axis, 1)]);
-            ways.map(|(axis, side)| onset(grid, torque, status, point, axis, side)).fold(0.0, f64::max)
-        };
-        differences.extend(least.map(|second| Difference { first: None, second, value: onset(second) }));
+    let onset = |point| {
+        let ways = (0..grid.joints()).flat_map(|axis| [(axis, 0), (axis, 1)]);
+        ways.map(|(axis, side)| onset(grid, torque, status, point, axis, side)).fold(0.0, f64::max)
+    };
+    let size = |point: usize| norm(torque, grid.joints(), point);
+    let touching: Vec<usize> = (0..grid.points()).filter(|&point| touches(point)).collect();
+    let adrift = adrift(grid.points(), &differences, &touching, size);
+    differences.extend(adrift.into_iter().map(|second| Difference { first: None, second, value: onset(second) }));
+    let mut energy = solve(grid.points(), &differences);
+    let stiffest: Vec<f64> = (0..grid.joints()).map(|axis| stiffest(grid, torque, status, axis)).collect();
+    for point in touching {
+        let held = torque[point * grid.joints()..].iter().zip(&stiffest).filter(|(_, stiffness)| **stiffness > 0.0);
+        energy[point] = held.map(|(tau, stiffness)| 0.5 * tau * tau / stiffness).fold(energy[point], f64::max);
     }
-    solve(grid.points(), &differences)
+    energy
+}
+
+/// Of each set of `touching` points that `differences` tie together and to nothing free, that of the least `size`.
+fn adrift(points: usize, differences: &[Difference], touching: &[usize], size: impl Fn(usize) -> f64) -> Vec<usize> {
+    // Each point leads to another of its set, in the end to the set's first.
+    let mut leads: Vec<usize> = (0..points).collect();
+    let find = |leads: &mut Vec<usize>, mut point: usize| {
+        while leads[point] != point {
+            leads[point] = leads[leads[point]];
+            point = leads[point];
+        }
+        point
+    };
+    for difference in differences {
+        let Some(first) = difference.first else { continue };
+        let [a, b] = [first, difference.second].map(|point| find(&mut leads, point));
+        leads[a.max(b)] = a.min(b);
+    }
+    let mut least: BTreeMap<usize, usize> = BTreeMap::new();
+    for &point in touching {
+        let kept = least.entry(find(&mut leads, point)).or_insert(point);
+        if size(point) < size(*kept) {
+            *kept = point;
+        }
+    }
+    for difference in differences.iter().filter(|difference| difference.first.is_none()) {
+        least.remove(&find(&mut leads, difference.second));
+    }
+    least.into_values().collect()
+}
+
+/// Greatest change of the torque along `axis` between neighbours that were measured, of which one touches at least (N m/rad
+/// or N/m).
+fn stiffest(grid: &Grid, torque: &[f64], status: &[u8], axis: usize) -> f64 {
+    let joints = grid.joints();
+    let is = |point: usize, what: Status| status[point] == what as u8;
+    let mut greatest = 0.0_f64;
+    for point in (0..grid.points()).filter(|&point| is(point, Status::Contact)) {
+        for beside in grid.beside(point, axis).into_iter().flatten().filter(|&beside| !is(beside, Status::Outside)) {
+            let change = torque[point * joints + axis] - torque[beside * joints + axis];
+            greatest = greatest.max(change.abs() / grid.axes[axis].step);
+        }
+    }
+    greatest
 }
 
 /// The differences between `point`, which touches, and its neighbours along `axis`: that behind, and free ones.
@@ -124,6 +187,29 @@ fn solve(points: usize, differences: &[Difference]) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::dataset::Axis;
+
+    /// Two walls of 10 N m/rad, one of which was measured from 0.1 rad behind its surface on.
+    #[test]
+    fn what_no_free_point_is_beside_has_an_energy_of_its_own_and_none_holds_less_than_its_torque() {
+        let axis = Axis { name: "a".into(), unit: "rad".into(), start: -0.5, step: 0.05, count: 21 };
+        let grid = Grid { axes: vec![axis] };
+        let depths: Vec<f64> = (0..21).map(|point| grid.configuration(point)[0].abs() - 0.2).collect();
+        let of =
+            |depth: f64, point: usize| if depth > 0.0 { -10.0 * depth * (point as f64 - 10.0).signum() } else { 0.0 };
+        let torque: Vec<f64> = depths.iter().zip(0..).map(|(depth, point)| of(*depth, point)).collect();
+        let of = |(point, depth): (usize, &f64)| match *depth {
+            depth if point > 10 && depth < 0.09 => Status::Outside,
+            depth if depth > 1e-9 => Status::Contact,
+            _ => Status::Free,
+        } as u8;
+        let status: Vec<u8> = depths.iter().enumerate().map(of).collect();
+        let torque: Vec<f64> = torque.iter().zip(&status).map(|(tau, s)| if *s == 1 { *tau } else { 0.0 }).collect();
+        let energy = energy(&grid, &torque, &status);
+        for point in (0..21).filter(|&point| status[point] == Status::Contact as u8) {
+            // What nobody measured before the first point behind the hole is at most what it would be at this stiffness.
+            assert!((energy[point] - 5.0 * depths[point].powi(2)).abs() < 1e-6, "{point}: {}", energy[point]);
+        }
+    }
 
     #[test]
     fn a_torque_with_a_potential_has_its_energy_and_a_curl_adds_none() {

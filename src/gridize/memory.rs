@@ -8,7 +8,7 @@
 
 use super::{
     Branches, Cells, GridizeOptions, GridizeReport, LeadDirection, Samples,
-    energy::energy,
+    energy::with_energy,
     gridize,
     relaxation::{Identified, Stretch, identify},
 };
@@ -94,7 +94,8 @@ pub fn gridize_remembering(
     };
     let mut last = Identified::default();
     for _ in 0..ROUNDS {
-        let (mut dataset, report) = with_energy(&samples, options)?;
+        let (dataset, report) = gridize(&samples, options)?;
+        let mut dataset = with_energy(dataset);
         let stretches = stretches(&dataset, histories)?;
         let found = identify(&stretches, MOST_TERMS, scaled).ok_or_else(|| Error::from(NO_HISTORY))?;
         if found.terms.is_empty() {
@@ -127,13 +128,6 @@ pub fn gridize_remembering(
 pub fn predict_histories(dataset: &Dataset, histories: &[ForceHistory]) -> Result<f64, Error> {
     let terms = dataset.provenance.relaxation.as_ref().map_or(&[][..], |relaxation| &relaxation.terms);
     Ok(misfit(&stretches(dataset, histories)?, terms, false))
-}
-
-fn with_energy(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, GridizeReport), Error> {
-    let (mut dataset, report) = gridize(samples, options)?;
-    let energy = energy(&dataset.grid, &dataset.torque, &dataset.status);
-    dataset.energy = Some(energy.into());
-    Ok((dataset, report))
 }
 
 /// Multiplies torque and energy of `dataset`.

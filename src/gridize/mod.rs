@@ -30,6 +30,7 @@ mod space;
 mod tetrahedra;
 
 pub use cells::{Branches, CellReport, Cells, LeadDirection};
+pub use energy::with_energy;
 pub use friction::{Reversals, gridize_sliding};
 pub use memory::{ForceHistory, Past, gridize_remembering, predict_histories};
 pub use samples::Samples;
@@ -89,7 +90,8 @@ pub struct GridizeOptions {
     /// Smooth torques within their measured standard deviation first.
     pub smooth: bool,
     /// Distance from the nearest of its samples up to which a grid point has a torque, in spacings of the samples (1);
-    /// infinite: the convex hull alone ends the measured region. [`WITHIN`] is a good choice.
+    /// infinite: the convex hull alone ends the measured region. [`WITHIN`] is a good choice. It is the diagonal of a grid
+    /// cell at least.
     pub within: f64,
 }
 
@@ -109,6 +111,9 @@ pub struct GridizeReport {
     /// Spacing of the samples: the distance to the nearest ones that together lead along all joints, median over the
     /// samples; for each joint how far that is along it (rad or m).
     pub spacing: Vec<f64>,
+    /// Distance from the samples up to which grid points have a torque, likewise; absent where the hull alone ends them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub distance: Vec<f64>,
     /// Grid points in contact.
     pub contact_points: usize,
     /// Torque threshold used (N m).
@@ -138,6 +143,9 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
     let grid = grid(samples, &options.steps)?;
     let linear = |pull| (pull, &cloud);
     let spacing = cloud.spacing();
+    // Cells of the grid in which a sample lies stay whole, however coarse they are.
+    let diagonal = cloud.length(&grid.axes.iter().map(|axis| axis.step).collect::<Vec<_>>());
+    let reach = diagonal.max(options.within * spacing);
     let (mut torque, distances) = match (options.interpolation, cloud.joints) {
         (Interpolation::Natural, 2) => fill(&plane::NaturalNeighbours::new(&cloud)?, &cloud, &grid),
         (Interpolation::Natural, joints) => {
@@ -151,7 +159,7 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         _ => fill_linear(hyperspace::Hyperspace::new(&cloud), linear(HYPER_PULL), &grid),
     };
     let is_inside = |distance: f64| distance.is_finite();
-    let is_known = |distance: f64| is_inside(distance) && distance <= options.within * spacing;
+    let is_known = |distance: f64| is_inside(distance) && distance <= reach;
     let status: Vec<u8> = torque
         .chunks_exact_mut(cloud.joints)
         .zip(&distances)
@@ -173,6 +181,7 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         inside: status.iter().filter(|status| **status != Status::Outside as u8).count(),
         far: distances.iter().filter(|distance| is_inside(**distance) && !is_known(**distance)).count(),
         spacing: cloud.unscaled(spacing),
+        distance: if reach.is_finite() { cloud.unscaled(reach) } else { Vec::new() },
         contact_points: status.iter().filter(|status| **status == Status::Contact as u8).count(),
         epsilon,
     };

@@ -130,7 +130,7 @@ pub const FIGURES: [FigureNote; 9] = [
         number: 7,
         file: "fig7-sponge",
         paper: "Photographs of the spongy plane, from above and from the side",
-        ours: "A drawing: the block is simulated, no sponge was touched",
+        ours: "A drawing: the block is simulated, no sponge was touched. Beside it its twin, pressed: shape and stiffness from the torques",
     },
     FigureNote {
         number: 8,

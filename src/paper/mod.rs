@@ -15,7 +15,7 @@ mod specimen;
 pub use backend::{PaperBackend, PaperSolver, baked, haptize};
 pub use comparison::{Comparison, FIGURES, FigureNote, Row, Value};
 pub use procedure::procedure;
-pub use specimen::specimen;
+pub use specimen::{PressedTwin, hardest, specimen};
 
 use crate::{
     dataset::Dataset,

@@ -1,4 +1,5 @@
-//! The spongy block with the arm that scans it, from above and from the side (the paper's Fig. 7, there photographs).
+//! The spongy block with the arm that scans it, from above and from the side (the paper's Fig. 7, there photographs), and the
+//! twin that explains its torques, pressed.
 //!
 //! The block is drawn at rest: its deformation is not part of a scan. Dots are the measured positions of the visiting
 //! node that lie clear of it.
@@ -9,7 +10,7 @@ use crate::{
     draw::{
         canvas::{Area, Canvas, Picture},
         chart,
-        colour::{self, Colour},
+        colour::{self, Colour, ColourMap},
         plot,
         raster::{Finish, Raster, Vertex, Viewpoint},
         ticks,
@@ -19,7 +20,7 @@ use crate::{
 };
 use glam::DVec3;
 
-const WIDTH: f64 = 860.0;
+const WIDTH: f64 = 1272.0;
 const CELL: [f64; 2] = [400.0, 320.0];
 const TOP: f64 = 88.0;
 /// Radius of a link and of a dot (m).
@@ -30,16 +31,32 @@ const CLEAR: f64 = 1e-3;
 const SPONGE: Colour = Colour::hex(0xf2_d3_7d);
 const MEASURED: Colour = Colour::hex(0x00_72_b2);
 
-/// Draws both scans.
+/// The twin of the block, scanned from above, where the arm pushes [hardest].
+pub struct PressedTwin {
+    /// Its nodes (m).
+    pub nodes: Vec<DVec3>,
+    /// Triangles of its surface.
+    pub triangles: Vec<[u32; 3]>,
+    /// How far each node is from its place at rest (m).
+    pub displacements: Vec<f64>,
+}
+
+/// Draws both scans, and the `twin`.
 #[must_use]
-pub fn specimen(scans: Scans<'_>) -> Canvas {
+pub fn specimen(scans: Scans<'_>, twin: &PressedTwin) -> Canvas {
     let mut canvas = Canvas::new(WIDTH, TOP + CELL[1] + 24.0);
-    chart::headline(&mut canvas, "The simulated spongy block, scanned from above and from the side");
-    for (number, (what, scanned)) in [("From above", scans.bare), ("From the side", scans.side)].into_iter().enumerate()
-    {
+    chart::headline(&mut canvas, "The simulated spongy block, scanned from above and from the side, and its twin");
+    let deepest = 1e3 * twin.displacements.iter().copied().fold(0.0, f64::max);
+    let pressed = format!("The twin of the first, pressed {deepest:.0} mm deep: its shape is of torques alone");
+    let pictures = [
+        (caption("From above", scans.bare), picture(scans.bare, None)),
+        (caption("From the side", scans.side), picture(scans.side, None)),
+        (pressed, picture(scans.bare, Some(twin))),
+    ];
+    for (number, (caption, picture)) in pictures.into_iter().enumerate() {
         let x = chart::MARGIN + number as f64 * (CELL[0] + 12.0);
-        canvas.text((x, TOP - 10.0), &caption(what, scanned), plot::NOTE);
-        canvas.picture((x, TOP), picture(scanned));
+        canvas.text((x, TOP - 10.0), &caption, plot::NOTE);
+        canvas.picture((x, TOP), picture);
         canvas.frame(Area { x, y: TOP, width: CELL[0], height: CELL[1] }, colour::GRID, 1.0);
     }
     canvas
@@ -53,8 +70,16 @@ fn caption(what: &str, scanned: Scanned<'_>) -> String {
     format!("{what}: a block of {sides} cm, {count} points; dots are those clear of it")
 }
 
-/// The block, the arm where it pushes hardest, and where the visiting node was measured.
-fn picture(scanned: Scanned<'_>) -> Picture {
+/// Where the arm pushes hardest, if it does (rad or m).
+#[must_use]
+pub fn hardest(scanned: Scanned<'_>) -> Option<JointVector> {
+    let ticks = scanned.trace.ticks.iter();
+    let by_torque = ticks.max_by(|a, b| a.sample.torque.norm().total_cmp(&b.sample.torque.norm()));
+    by_torque.map(|tick| tick.proxy)
+}
+
+/// The block, the arm where it pushes hardest, and where the visiting node was measured; or the `twin` in their place.
+fn picture(scanned: Scanned<'_>, twin: Option<&PressedTwin>) -> Picture {
     let block = &scanned.scene.scan.simulated;
     let chain = scanned.chain;
     let mut pose = chain.new_pose();
@@ -65,10 +90,9 @@ fn picture(scanned: Scanned<'_>) -> Picture {
     };
     let configurations = scanned.samples.configurations.chunks_exact(chain.joints.len());
     let dots: Vec<DVec3> = configurations.map(&mut visited).filter(|&x| !holds(block, x)).collect();
-    let by_torque = scanned.trace.ticks.iter().max_by(|a, b| a.sample.torque.norm().total_cmp(&b.sample.torque.norm()));
-    let pressed = by_torque.map(|tick| {
+    let pressed = hardest(scanned).map(|q| {
         let mut pose = chain.new_pose();
-        chain.pose(&tick.proxy, &mut pose);
+        chain.pose(&q, &mut pose);
         pose
     });
 
@@ -79,8 +103,17 @@ fn picture(scanned: Scanned<'_>) -> Picture {
     // From the front left above: the arm stands behind the block's near end, not before it.
     let direction = DVec3::new(0.45, -1.0, 0.6);
     let mut raster = Raster::new(Viewpoint::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize)));
-    draw_block(&mut raster, block);
-    dots.into_iter().for_each(|dot| raster.sphere(dot, DOT, MEASURED));
+    match twin {
+        Some(PressedTwin { nodes, triangles, displacements }) => {
+            let map = ColourMap::Pale { low: 0.0, high: displacements.iter().copied().fold(0.0, f64::max) };
+            let colours: Vec<Colour> = displacements.iter().map(|moved| map.colour(*moved)).collect();
+            raster.mesh(nodes, triangles, &colours);
+        }
+        None => {
+            draw_block(&mut raster, block);
+            dots.into_iter().for_each(|dot| raster.sphere(dot, DOT, MEASURED));
+        }
+    }
     if let Some(pose) = &pressed {
         draw_proxy(&mut raster, chain, pose, LINK, &[]);
     }

@@ -38,6 +38,7 @@ pub(super) const TRACED: &[TickColumn] = &[
     ("contact index", |tick| Number(&mut tick.sample.index)),
     ("contact", |tick| Switch(&mut tick.sample.contact)),
     ("contact nodes", |tick| Count(&mut tick.sample.contact_nodes)),
+    ("twin share", |tick| Number(&mut tick.sample.twin)),
     ("flags", |tick| Remarks(&mut tick.flags)),
     ("fault", |tick| Text(tick.fault.map_or_else(String::new, |fault| fault.to_string()))),
     ("clamps", |tick| Text(tick.applied.clamps.bits().to_string())),

@@ -109,6 +109,12 @@ impl LiveScene {
         }
     }
 
+    /// `dataset`, of the real object whose twin this is, with the surface of the twin.
+    #[must_use]
+    pub fn beside(&self, dataset: Dataset) -> Dataset {
+        Dataset { surface: Some(Surface::of(self.direct.model().object)), ..dataset }
+    }
+
     /// Returns what is felt other than the scene says, as a sentence without its full stop.
     #[must_use]
     pub fn notice(&self) -> Option<&'static str> {
@@ -200,7 +206,8 @@ impl<'a> LiveSession<'a> {
             }
             let contact = status == Status::Contact;
             let (index, flags) = (f64::from(u8::from(contact)), Flags::empty());
-            (self.felt, self.age) = (Sample { torque, index, contact, contact_nodes, energy, share: 1.0, flags }, 0);
+            self.felt = Sample { torque, index, contact, contact_nodes, energy, share: 1.0, twin: 0.0, flags };
+            self.age = 0;
         } else {
             self.felt.flags = Flags::UNCONVERGED;
             self.age += 1;

@@ -29,6 +29,7 @@ pub mod setup;
 pub mod source;
 mod torque_history;
 pub mod trace;
+pub mod twinned;
 pub mod watchdog;
 
 pub use crate::control::timing;

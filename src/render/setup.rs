@@ -1,5 +1,6 @@
 //! Everything that a dataset's rendering needs, built from the dataset alone: its scene's text gives chain and gains,
-//! its surface the object. A scene that is solved live is rendered like a dataset in which nothing is stored.
+//! its surface the object. A scene that is solved live is rendered like a dataset in which nothing is stored; the dataset of
+//! a real object with its twin has the surface and the object of the twin.
 
 use super::{
     graphics::{ContactForces, Graphics},
@@ -10,6 +11,7 @@ use super::{
     passivity::{self, Advice, Bound},
     session::Plan,
     source::TorqueSource,
+    twinned::TwinnedField,
 };
 use crate::{
     Error, JointVector,
@@ -60,10 +62,19 @@ impl Setup {
     /// # Errors
     /// As [`Setup::new`].
     pub fn live(scene: Arc<LiveScene>, dataset: &Dataset) -> Result<Self, Error> {
-        Self::of(dataset, Some(scene))
+        Self::of(dataset, Some(TorqueSource::Live(scene)))
     }
 
-    fn of(dataset: &Dataset, live: Option<Arc<LiveScene>>) -> Result<Self, Error> {
+    /// The same for `dataset`, of a real object, [beside](LiveScene::beside) its twin: that moves in the picture, and
+    /// answers where nothing was measured.
+    ///
+    /// # Errors
+    /// As [`Setup::new`], or when the dataset holds no energy.
+    pub fn twinned(twin: Arc<LiveScene>, dataset: &Dataset) -> Result<Self, Error> {
+        Self::of(dataset, Some(TwinnedField::new(dataset, twin)?.into()))
+    }
+
+    fn of(dataset: &Dataset, source: Option<TorqueSource>) -> Result<Self, Error> {
         if dataset.scene.trim().is_empty() {
             return Err(
                 "the dataset holds no scene, so that its arm and gains are not known: gridize it again with --scene ARM.toml, \
@@ -81,12 +92,16 @@ impl Setup {
         }
         dataset.check_scene().map_err(|what| error!("the dataset contradicts itself: {what}: bake it again"))?;
         let made_motions = own_motion::add(&mut scene, dataset);
-        let Loop { haptics, bounds, gains, advice } =
-            haptic_loop(dataset, &chain, &scene, &scene.haptics, live.as_ref())?;
+        let is_live = source.is_some();
+        if let Some(TorqueSource::Twinned(field)) = &source {
+            let twin = field.twin().scene();
+            (scene.object, scene.graphics) = (Some(twin.object.clone()), twin.graphics);
+        }
+        let Loop { haptics, bounds, gains, advice } = haptic_loop(dataset, &chain, &scene, &scene.haptics, source)?;
         // From here on the gains are as any others.
         scene.haptics = HapticsSpec { proxy_damping_is_free: false, ..gains };
         let exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
-        let is_known = live.is_some() || ContactForces::known(dataset);
+        let is_known = is_live || ContactForces::known(dataset);
         let object = match (&scene.object, &scene.graphics, &dataset.surface) {
             (Some(object), Some(_), Some(surface)) if is_known => {
                 let object = surface.object(object);
@@ -113,8 +128,8 @@ impl Setup {
     /// # Errors
     /// When they do not make a loop.
     pub fn retuned(&self, dataset: &Dataset, gains: &HapticsSpec) -> Result<(Haptics, Option<Advice>), Error> {
-        let live = self.haptics.source().live();
-        let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, live)?;
+        let source = self.haptics.source().whatever_gains();
+        let Loop { haptics, advice, .. } = haptic_loop(dataset, &self.chain, &self.scene, gains, source)?;
         Ok((haptics, advice))
     }
 
@@ -130,9 +145,9 @@ impl Setup {
                         [haptics] device_damping"
                 .into());
         };
-        let live = self.haptics.source().live();
+        let source = self.haptics.source().whatever_gains();
         let Loop { haptics, bounds, gains, advice: left } =
-            haptic_loop(dataset, &self.chain, &self.scene, &gains, live)?;
+            haptic_loop(dataset, &self.chain, &self.scene, &gains, source)?;
         self.exceeded = bounds.iter().filter(|bound| bound.is_exceeded()).cloned().collect();
         (self.haptics, self.bounds, self.scene.haptics, self.advice) = (Arc::new(haptics), bounds, gains, left);
         Ok(changes)
@@ -221,17 +236,20 @@ struct Loop {
     advice: Option<Advice>,
 }
 
-/// Makes the haptic loop over `dataset`, or the scene that is solved `live`, with `gains` in the place of those of its
+/// Makes the haptic loop over `source`, by default the field of `dataset`, with `gains` in the place of those of its
 /// `scene`.
 fn haptic_loop(
     dataset: &Dataset,
     chain: &Chain,
     scene: &Rendering,
     gains: &HapticsSpec,
-    live: Option<&Arc<LiveScene>>,
+    source: Option<TorqueSource>,
 ) -> Result<Loop, Error> {
-    let (source, range) = match live {
-        Some(scene) => (TorqueSource::Live(Arc::clone(scene)), HaptizedRange::of_grid(scene.grid())),
+    let (source, range) = match source {
+        Some(source) => {
+            let range = HaptizedRange::of_grid(source.grid());
+            (source, range)
+        }
         None => {
             let HapticsSpec { interpolation, threshold, boundary_slope, .. } = gains;
             let field = TorqueField::interpolated(dataset, *interpolation, *threshold, boundary_slope)?;

@@ -1,6 +1,10 @@
-//! Where the contact torque of a loop comes from: a dataset, or a scene that is solved in every tick.
+//! Where the contact torque of a loop comes from: a dataset, a scene that is solved in every tick, or both: the dataset of a
+//! real object and its twin.
 
-use super::live::{LiveScene, LiveSession};
+use super::{
+    live::{LiveScene, LiveSession},
+    twinned::{TwinnedField, TwinnedSession},
+};
 use crate::{
     JointVector,
     contact::Slip,
@@ -15,6 +19,8 @@ pub enum TorqueSource {
     Dataset(TorqueField),
     /// Torque that is solved in every tick.
     Live(Arc<LiveScene>),
+    /// Torque that was measured, and solved where it was not.
+    Twinned(Arc<TwinnedField>),
 }
 
 /// What one session has of it.
@@ -23,11 +29,19 @@ pub enum ContactSession<'a> {
     Dataset(&'a TorqueField),
     /// See [`TorqueSource::Live`].
     Live(Box<LiveSession<'a>>),
+    /// See [`TorqueSource::Twinned`].
+    Twinned(Box<TwinnedSession<'a>>),
 }
 
 impl From<TorqueField> for TorqueSource {
     fn from(field: TorqueField) -> Self {
         Self::Dataset(field)
+    }
+}
+
+impl From<TwinnedField> for TorqueSource {
+    fn from(field: TwinnedField) -> Self {
+        Self::Twinned(Arc::new(field))
     }
 }
 
@@ -37,16 +51,35 @@ impl TorqueSource {
     pub fn field(&self) -> Option<&TorqueField> {
         match self {
             Self::Dataset(field) => Some(field),
-            Self::Live(_) => None,
+            Self::Live(_) | Self::Twinned(_) => None,
         }
     }
 
-    /// The scene that is solved in every tick.
+    /// The scene that is solved in every tick, or where nothing was measured.
     #[must_use]
     pub fn live(&self) -> Option<&Arc<LiveScene>> {
         match self {
             Self::Dataset(_) => None,
             Self::Live(scene) => Some(scene),
+            Self::Twinned(field) => Some(field.twin()),
+        }
+    }
+
+    /// The dataset of a real object and its twin.
+    #[must_use]
+    pub fn twinned(&self) -> Option<&TwinnedField> {
+        match self {
+            Self::Dataset(_) | Self::Live(_) => None,
+            Self::Twinned(field) => Some(field),
+        }
+    }
+
+    /// The same for a loop with other gains; none where these choose how it is interpolated.
+    pub(super) fn whatever_gains(&self) -> Option<Self> {
+        match self {
+            Self::Dataset(_) => None,
+            Self::Live(scene) => Some(Self::Live(Arc::clone(scene))),
+            Self::Twinned(field) => Some(Self::Twinned(Arc::clone(field))),
         }
     }
 
@@ -62,6 +95,7 @@ impl TorqueSource {
         match self {
             Self::Dataset(field) => field.grid(),
             Self::Live(scene) => scene.grid(),
+            Self::Twinned(field) => field.twin().grid(),
         }
     }
 
@@ -70,7 +104,7 @@ impl TorqueSource {
     pub fn has_energy(&self) -> bool {
         match self {
             Self::Dataset(field) => field.has_energy(),
-            Self::Live(_) => true,
+            Self::Live(_) | Self::Twinned(_) => true,
         }
     }
 
@@ -80,6 +114,7 @@ impl TorqueSource {
         match self {
             Self::Dataset(field) => field.has_slip(),
             Self::Live(_) => true,
+            Self::Twinned(field) => field.has_slip(),
         }
     }
 
@@ -88,7 +123,7 @@ impl TorqueSource {
     pub fn is_potential(&self) -> bool {
         match self {
             Self::Dataset(field) => field.is_potential(),
-            Self::Live(_) => true,
+            Self::Live(_) | Self::Twinned(_) => true,
         }
     }
 
@@ -99,6 +134,7 @@ impl TorqueSource {
         match self {
             Self::Dataset(field) => field.relative_stiffness(slopes),
             Self::Live(scene) => scene.relative_stiffness(slopes),
+            Self::Twinned(field) => field.relative_stiffness(slopes),
         }
     }
 
@@ -108,6 +144,7 @@ impl TorqueSource {
         match self {
             Self::Dataset(field) => ContactSession::Dataset(field),
             Self::Live(scene) => ContactSession::Live(Box::new(LiveSession::new(scene))),
+            Self::Twinned(field) => ContactSession::Twinned(Box::new(TwinnedSession::new(field))),
         }
     }
 }
@@ -119,6 +156,7 @@ impl ContactSession<'_> {
         match self {
             Self::Dataset(field) => (field.sample(q), 0),
             Self::Live(session) => session.sample(q),
+            Self::Twinned(session) => session.sample(q),
         }
     }
 
@@ -128,6 +166,7 @@ impl ContactSession<'_> {
         match self {
             Self::Dataset(field) => field.slip(q, sample),
             Self::Live(session) => session.slip(q),
+            Self::Twinned(session) => session.slip(q, sample),
         }
     }
 }

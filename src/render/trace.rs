@@ -125,6 +125,10 @@ pub struct Summary {
     pub absent: usize,
     /// Ticks with the proxy beside an unconverged grid point, or for which contact was not solved in time.
     pub unconverged: usize,
+    /// Ticks in which the twin of a real object answers, and those in which it alone does.
+    pub twin_ticks: usize,
+    /// See `twin_ticks`.
+    pub twin_alone: usize,
     /// Ticks with the torque on the device limited in size or rate.
     pub limited: usize,
     /// Ticks with a fault.
@@ -145,6 +149,8 @@ impl Trace {
         s.held = flagged(Flags::HELD);
         s.absent = flagged(Flags::ABSENT);
         s.unconverged = flagged(Flags::UNCONVERGED);
+        s.twin_ticks = self.ticks.iter().filter(|tick| tick.sample.twin > 0.0).count();
+        s.twin_alone = self.ticks.iter().filter(|tick| tick.sample.twin == 1.0).count();
         s.limited = flagged(Flags::SIZE_LIMITED | Flags::RATE_LIMITED);
         s.faults = self.ticks.iter().filter(|tick| tick.fault.is_some()).count();
         s.clamped = self.ticks.iter().filter(|tick| !tick.applied.clamps.is_empty()).count();

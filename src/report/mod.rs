@@ -11,6 +11,7 @@ pub mod press;
 pub mod scanned;
 pub mod slices;
 pub mod space;
+pub mod twinned;
 
 use crate::{
     Error, ErrorKind,
@@ -79,7 +80,7 @@ impl<'a> Figure<'a> {
 }
 
 /// Returns all figures that the data allow. `live`: the scene of a recording whose contact was solved in every tick, of
-/// which the dataset holds nothing.
+/// which the dataset holds nothing, or where nothing was measured.
 ///
 /// `cspace.png` (Fig. 3) and `torque.{svg,png}` show the dataset, where it holds something; with a recording of the proxy `chain` also
 /// `motion.{svg,png}` (Fig. 5), `energy.{svg,png}`, with three joints of which the last link alone touches
@@ -91,7 +92,7 @@ where
     T: Deref<Target = Trace> + Clone + Send + 'a,
 {
     let mut figures = Vec::new();
-    if live.is_none() {
+    if live.is_none() || dataset.energy.is_some() {
         let shown = dataset.clone();
         figures.push(Figure::picture("cspace", move || Ok(space::space(&shown))));
         let (shown, deepest) = (dataset.clone(), recording.and_then(|(_, trace)| press::deepest(trace)));

@@ -93,7 +93,7 @@ pub fn energy(trace: &Trace) -> Canvas {
     stack("Energy accounts of proxy and coupling", trace, lanes)
 }
 
-fn stack(headline: &str, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
+pub(super) fn stack(headline: &str, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
     Stack {
         headline: headline.to_owned(),
         across: "Time [s]".to_owned(),
@@ -106,7 +106,12 @@ fn stack(headline: &str, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
 
 /// A panel for each unit that occurs among the joints, with a curve for each joint of that unit; `names` are those of
 /// the quantity for joints in radians and in metres.
-fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick, usize) -> Option<f64>) -> Vec<Lane> {
+pub(super) fn per_joint(
+    trace: &Trace,
+    names: [&str; 2],
+    torque: bool,
+    value: impl Fn(&Tick, usize) -> Option<f64>,
+) -> Vec<Lane> {
     let occurs = |unit: &str| trace.joints.iter().any(|joint| joint.unit == unit);
     let units = ["rad", "m"].into_iter().zip(names).filter(|(unit, _)| occurs(unit));
     let lanes = units.map(|(unit, what)| {
@@ -126,7 +131,7 @@ fn per_joint(trace: &Trace, names: [&str; 2], torque: bool, value: impl Fn(&Tick
     lanes
 }
 
-fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick) -> f64) -> Curve {
+pub(super) fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick) -> f64) -> Curve {
     let points = trace.ticks.iter().map(|tick| (tick.time, value(tick))).collect();
     Curve { name: name.to_owned(), colour, dashed: false, points }
 }

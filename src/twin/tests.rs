@@ -4,12 +4,12 @@
 use super::{Approaches, Modulus, ScannedShape, Watched, twin_scene};
 use crate::{
     JointVector,
-    contact::{Model, Solver},
+    contact::{Model, Solver, geometry::RestSurface},
     object::Object,
     proxy::{Chain, inverse_kinematics::reach},
     random::Random,
     scan::{LogHeader, Plan, RowStatus, ScanLog, ScanRow, labels},
-    scene::{ScanScene, Scene},
+    scene::{ContactSurface, ScanScene, Scene},
 };
 use glam::DVec3;
 use std::sync::atomic::AtomicBool;
@@ -239,6 +239,8 @@ struct Likeness {
     /// the last two levels.
     torque: [f64; 3],
     misfit: f64,
+    /// Distance of the surface that was touched to that of the truth, rms, over the spacing (1).
+    surface: f64,
     /// Coefficient of friction (1), whose truth is [`FRICTION`].
     friction: f64,
 }
@@ -313,7 +315,11 @@ fn compare(
         }
         largest = displacement.iter().map(|u| u.length()).fold(largest, f64::max);
     }
+    let surface = RestSurface::new(truth, ContactSurface::Smooth);
+    let offs = shape.nodes.iter().zip(&shape.deviations).filter(|(_, known)| known.is_some());
+    let offs: Vec<f64> = offs.map(|(x, _)| surface.signed_distance(*x - surface.centre, u32::MAX)).collect();
     Likeness {
+        surface: f64::sqrt(offs.iter().map(|off| off * off).sum::<f64>() / offs.len() as f64) / shape.spacing,
         modulus: modulus.young / young,
         displacement: f64::sqrt(squares / count) / largest,
         torque: worst,
@@ -329,6 +335,7 @@ fn the_twin_of_a_slab_is_as_stiff_moves_alike_and_answers_deeper_than_was_scanne
     println!("slab: {found:?}");
     assert!(found.misfit < 0.05);
     assert!((found.modulus - 1.0).abs() < 0.1 && found.displacement < 0.1 && found.torque[1] < 0.15);
+    assert!(found.surface < 0.1);
 }
 
 #[test]
@@ -346,6 +353,7 @@ fn the_twin_of_a_bean_is_as_stiff_and_moves_alike() {
     let found = likeness(&BEAN, [-0.04, 1.5e4, 0.02], [[0.165, 0.002], [0.157, -0.006], [0.173, 0.006]], 0.008);
     println!("bean: {found:?}");
     assert!((found.modulus - 1.0).abs() < 0.1 && found.displacement < 0.12 && found.torque[0] < 0.1);
+    assert!(found.surface < 0.1);
 }
 
 /// A ball of ten times the slab's stiffness, 3 mm below its top, is seen from outside.

@@ -36,6 +36,8 @@ pub enum Start {
     Sphere,
     /// A scene, which is solved live, or a dataset.
     File(PathBuf),
+    /// The dataset of a real object, and its twin.
+    Twinned(PathBuf, PathBuf),
 }
 
 impl Start {
@@ -44,10 +46,16 @@ impl Start {
     /// # Errors
     /// When it cannot.
     pub fn check(&self) -> Result<(), ViewError> {
-        let Self::File(path) = self else { return Ok(()) };
+        let files = match self {
+            Self::Sphere => vec![],
+            Self::File(path) => vec![path],
+            Self::Twinned(dataset, twin) => vec![dataset, twin],
+        };
         let remedy = "give a scene (.toml) or a dataset (.haptize)";
-        let unreadable = |error| ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()));
-        input::open(path).map(drop).map_err(unreadable)
+        files.into_iter().try_for_each(|path| {
+            let unreadable = |error| ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()));
+            input::open(path).map(drop).map_err(unreadable)
+        })
     }
 }
 
@@ -184,6 +192,7 @@ impl Viewer {
                 Err(error) => self.error = Some(error.to_string()),
             },
             Start::File(path) => self.open_file(path, egui),
+            Start::Twinned(dataset, twin) => self.begin(Task::OpenTwinned(dataset.clone(), twin.clone()), egui),
         }
     }
 

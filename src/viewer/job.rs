@@ -32,6 +32,8 @@ use std::{
 pub enum Task {
     /// Open a scene, to be solved live, or a dataset.
     Open(PathBuf),
+    /// Open the dataset of a real object, and the scene of its twin.
+    OpenTwinned(PathBuf, PathBuf),
     /// Bake a scene, on the geometry that a dataset holds of its object where there is one: its mesh is not read again
     /// then.
     Bake(Arc<Scene>, Option<Surface>),
@@ -140,7 +142,9 @@ impl Job {
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
         let title = match &task {
-            Task::Open(path) => format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display()),
+            Task::Open(path) | Task::OpenTwinned(path, _) => {
+                format!("Opening {}", path.file_name().unwrap_or(path.as_os_str()).display())
+            }
             Task::Bake(scene, _) => format!("Haptizing {}", scene.name),
             Task::Edit(scene, _) => format!("Placing {}", scene.name),
         };
@@ -225,6 +229,10 @@ fn run(
         Task::Edit(scene, edit) => {
             let (scene, start) = edited(&scene, &edit)?;
             Loaded { edited: true, at: start, ..Loaded::live(scene)? }
+        }
+        Task::OpenTwinned(path, twin) => {
+            let (dataset, twin) = (Dataset::load(&path)?, Scene::load(&twin)?);
+            Loaded::twinned(dataset, twin, path.clone()).map_err(|error| format!("{}: {error}", path.display()))?
         }
         Task::Bake(scene, surface) => bake((*scene).clone(), surface, solver, context, stop, progress)?,
     };

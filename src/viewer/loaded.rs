@@ -4,6 +4,7 @@ use crate::{
     Error, JointVector,
     dataset::Dataset,
     device::Motion,
+    gridize::with_energy,
     render::{graphics::ContactForces, haptic::Haptics, live::LiveScene, passivity::Advice, setup::Setup},
     scene::{HapticsSpec, Scene, Tuning},
     sweep::SweepReport,
@@ -73,6 +74,16 @@ impl Loaded {
         let dataset = live.dataset();
         let loaded = Self::of(Setup::live(Arc::clone(&live), &dataset)?, dataset, Some(scene), None)?;
         Ok(Self { live: Some(live), ..loaded })
+    }
+
+    /// A `dataset` of a real object in `file` with its `twin`.
+    ///
+    /// # Errors
+    /// When the twin cannot be solved, or the dataset cannot be rendered.
+    pub fn twinned(dataset: Dataset, twin: Scene, file: PathBuf) -> Result<Self, Error> {
+        let twin = Arc::new(LiveScene::new(twin)?);
+        let dataset = twin.beside(with_energy(dataset));
+        Self::of(Setup::twinned(twin, &dataset)?, dataset, None, Some(file))
     }
 
     /// Gains and effects as its scene has them.

@@ -525,6 +525,12 @@ fn felt(ui: &mut Ui, session: &mut Session, touched: Option<usize>) {
         ui.label(RichText::new(format!("dent {:.0} %", 100.0 * dent)).small())
             .on_hover_text("What would stay of the dent if the arm let go now, or is left since it did");
     }
+    if session.loaded.setup.haptics.source().twinned().is_some() {
+        ui.separator();
+        ui.label(RichText::new(format!("twin {:.0} %", 100.0 * tick.sample.twin)).small()).on_hover_text(
+            "The part of the torque that the twin answers, where nothing was measured; it is what is drawn",
+        );
+    }
     if let Some(scene) = &session.loaded.live {
         ui.separator();
         let text = scene.notice().unwrap_or("contact is solved in every tick, before the surface at rest");

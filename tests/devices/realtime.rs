@@ -440,6 +440,30 @@ fn contact_that_is_solved_live_allocates_nothing_in_a_tick() {
     }
 }
 
+/// The dataset of a real object with its twin: measured, passing over, and the twin alone.
+#[test]
+fn a_dataset_with_its_twin_allocates_nothing_in_a_tick() {
+    let file = format!("{}/tests/scenes/small.toml", env!("CARGO_MANIFEST_DIR"));
+    let scene = Scene::load(&file).unwrap();
+    let twin = Arc::new(LiveScene::new(scene.clone()).unwrap());
+    let dataset = twin.beside(baked(&scene).unwrap().0);
+    let setup = Setup::twinned(twin, &dataset).unwrap();
+    let mut state = setup.haptics.start(&JointVector::from_slice(&[0.0, 0.02])).unwrap();
+    let mut contact = setup.haptics.source().begin();
+    let mut touched = [0; 2];
+    assert_no_alloc(|| {
+        for k in 0..8000 {
+            // Into contact and beyond the grid, to and fro.
+            let phase = 1e-3 * f64::from(k);
+            let position = JointVector::from_slice(&[0.4 * phase.sin(), 0.034 - 0.014 * (3.0 * phase).cos()]);
+            let inputs = Inputs { position, age: 0.0, elapsed: 1e-3, interval: 1e-3 };
+            let sample = setup.haptics.tick_with(&mut state, &inputs, &mut contact).sample;
+            touched[usize::from(sample.twin > 0.0)] += usize::from(sample.contact);
+        }
+    });
+    assert!(touched.iter().all(|ticks| *ticks > 20), "{touched:?}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_file_that_another_program_cuts_short_does_not_stop_a_running_loop() {

@@ -8,6 +8,7 @@ mod press;
 mod range;
 mod recording;
 mod safety;
+mod twinned;
 
 use crate::common::desktop::{haptics, proxy};
 use glam::DVec3;

@@ -50,6 +50,7 @@ fn marked() -> Trace {
             contact_nodes: 7,
             energy: 1e-30,
             share: 0.875,
+            twin: 0.25,
             flags: Flags::LAYER,
         },
         flags: Flags::LAYER | Flags::HELD,
@@ -67,7 +68,7 @@ fn marked() -> Trace {
 const TRACE_FILE: &str = "\
 time [s],hand a_b [rad],hand c [m],device a_b [rad],device c [m],proxy a_b [rad],proxy c [m],device torque a_b [N m],\
 device torque c [N],held torque a_b [N m],held torque c [N],contact torque a_b [N m],contact torque c [N],\
-contact index,contact,contact nodes,flags,fault,clamps,halt,initial [J],kinetic [J],spring [J],presliding [J],\
+contact index,contact,contact nodes,twin share,flags,fault,clamps,halt,initial [J],kinetic [J],spring [J],presliding [J],\
 coupling work [J],channel work [J],field work [J],stop work [J],proxy dissipation [J],coupling dissipation [J],\
 friction dissipation [J],control dissipation [J],residual [J],exchanged [J],stored [J],relaxed [J],\
 first stored [J],leak [J],port work [J],device dissipation [J]
@@ -81,7 +82,7 @@ fn files_of_a_session_have_the_columns_that_programs_know() {
     trace.write_ticks(&mut written).unwrap();
     let text = String::from_utf8(written).unwrap();
     let (fault, halt) = (Fault::Late, Halt::Stale);
-    let start = "3,0.25,5,0.375,7,0.5,9,0.625,11,0.75,13,0.875,0.125,1,7,136";
+    let start = "3,0.25,5,0.375,7,0.5,9,0.625,11,0.75,13,0.875,0.125,1,7,0.25,136";
     let end = "0,-0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,,0,0,0";
     assert_eq!(text, format!("{TRACE_FILE}0,{start},{fault},1,{halt},{end}\n1.5,{start},,1,{halt},{end}\n"));
 
