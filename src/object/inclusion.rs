@@ -4,7 +4,7 @@
 //! point of quadrature has the material that is there. Where it is stiffer, that overrates it, since strain gathers in
 //! the soft part: then each part of an element, an eighth of a cube or a tetrahedron, has the harmonic mean of shear
 //! and bulk modulus over it, as layers in series have (Reuss 1929). Measured against meshes that fit:
-//! `docs/solids.md`.
+//! `docs/nodule.md`.
 
 use super::element::Lame;
 use crate::{

@@ -6,7 +6,7 @@
 //! have in energy under a pressure whose edge their nodes do not follow. Coarser cubes take a tenth of the work of
 //! those in question; finer ones would take some thirty times as much.
 
-use super::{Compliance, Mechanics, Object, lattice, topology};
+use super::{Compliance, Mechanics, Object, spacing::Spacing, topology};
 use crate::scene::{ElasticSpec, Material, ObjectSpec};
 use crate::{Error, cache::Cache};
 use glam::DVec3;
@@ -70,7 +70,7 @@ impl Object {
         places.sort_by(|&i, &j| trace(i).total_cmp(&trace(j)));
         let typical = *places.get(places.len() / 2).filter(|_| self.tetrahedra.is_empty())?;
         let edge = topology::mean_edge(&self.rest, &self.triangles);
-        let cell = elastic.cell.unwrap_or_else(|| lattice::suitable_size(&self.rest, edge));
+        let cell = elastic.cell.unwrap_or_else(|| Spacing::new(&self.rest, &self.triangles).suitable_size(&self.rest));
         let node = compliance.nodes[typical];
         let key = [&self.key[..], b"error of the lattice", &node.to_le_bytes()].concat();
         let kept = Cache::used().and_then(|cache| cache.find(&key));

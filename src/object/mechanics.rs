@@ -6,9 +6,11 @@ use super::{
     ground::{self, Held},
     inclusion::Materials,
     lattice::{self, Lattice},
+    level::Level,
     ordering,
     skin::Laplacian,
     solid::{self, Elements},
+    spacing::Spacing,
     springs,
     tetrahedra::Tetrahedra,
     topology::mean_edge,
@@ -51,10 +53,12 @@ impl Mechanics {
         let mut points = Vec::new();
         let elements: Option<Box<dyn Elements>> = match &spec.material {
             Material::Elastic(elastic) if object.tetrahedra.is_empty() => {
-                let cell = elastic.cell.unwrap_or_else(|| lattice::suitable_size(shell, edge));
-                let lattice = Lattice::around(shell, cell)?;
+                let spacing = Spacing::new(shell, &object.triangles);
+                let cell = elastic.cell.unwrap_or_else(|| spacing.suitable_size(shell));
+                let finest = Level::around(shell, cell)?;
                 points = attachment::surface_points(shell, &object.triangles, lattice::POINT_SPACING * cell);
-                Some(Box::new(lattice.fill(shell, &object.triangles, &points)))
+                let surface = (shell, &object.triangles[..]);
+                Some(Box::new(Lattice::fill(finest, surface, &points, &spacing, &Materials::new(elastic))))
             }
             Material::Elastic(_) => Some(Box::new(Tetrahedra::new(object))),
             _ => None,

@@ -131,8 +131,8 @@ pub struct ElasticSpec {
     pub young: f64,
     /// Poisson's ratio nu, above -1 and below 1/2 (1).
     pub poisson: f64,
-    /// Size of the cubes of the lattice that fills a surface (m). None where the shape is tetrahedra, or where the size
-    /// follows from the surface.
+    /// Size of the smallest cubes of the lattice that fills a surface (m). None where the shape is tetrahedra, or where
+    /// the size follows from the surface.
     pub cell: Option<f64>,
     /// Parts with another stiffness; where two overlap, the later one counts.
     pub inclusions: Vec<InclusionSpec>,

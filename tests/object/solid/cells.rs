@@ -7,14 +7,14 @@ use std::fmt::Write;
 
 /// Gmsh's order of nodes: its types of first order, of second order without and with nodes in faces; the corners' edges,
 /// and its faces of four corners.
-struct Cell {
+pub struct Cell {
     kinds: [u64; 3],
     corners: usize,
-    edges: &'static [[usize; 2]],
-    squares: &'static [[usize; 4]],
+    pub edges: &'static [[usize; 2]],
+    pub squares: &'static [[usize; 4]],
 }
 
-const HEXAHEDRON: Cell = Cell {
+pub const HEXAHEDRON: Cell = Cell {
     kinds: [5, 17, 12],
     corners: 8,
     edges: &[[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]],
@@ -80,26 +80,35 @@ fn msh(cell: &Cell, order: usize, counts: [i32; 3], place: impl Fn(DVec3) -> DVe
             elements.push(nodes.into_iter().map(&mut number).collect::<Vec<_>>());
         }
     }
-    // A permutation: a prime that the count is no multiple of.
-    let tag = |number: usize| 1 + number * 7919 % numbers.len();
-    assert!(!numbers.len().is_multiple_of(7919));
-    let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n", numbers.len());
-    let mut listed: Vec<([i32; 3], usize)> = numbers.iter().map(|(at, number)| (*at, tag(*number))).collect();
-    listed.sort_by_key(|(_, tag)| *tag);
-    for (at, tag) in listed {
-        let x = place(DVec3::from_array([0, 1, 2].map(|axis| f64::from(at[axis]) / f64::from(4 * counts[axis]))));
-        writeln!(text, "{tag} {} {} {}", x.x, x.y, x.z).unwrap();
+    let mut places = vec![DVec3::ZERO; numbers.len()];
+    for (at, number) in numbers {
+        let at = DVec3::from_array([0, 1, 2].map(|axis| f64::from(at[axis]) / f64::from(4 * counts[axis])));
+        places[number] = place(at);
     }
+    let elements: Vec<(u32, Vec<usize>)> = elements.into_iter().map(|nodes| (1, nodes)).collect();
+    written(cell.kinds[order], &places, &elements)
+}
+
+/// A file of elements of type `kind`, each with its physical volume, between nodes at `places` (m), whose numbers are
+/// out of order.
+pub fn written(kind: u64, places: &[DVec3], elements: &[(u32, Vec<usize>)]) -> String {
+    // A permutation: a prime that the count is no multiple of.
+    let tag = |number: usize| 1 + number * 7919 % places.len();
+    assert!(!places.len().is_multiple_of(7919));
+    let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n", places.len());
+    let mut listed: Vec<(usize, DVec3)> = places.iter().enumerate().map(|(number, x)| (tag(number), *x)).collect();
+    listed.sort_by_key(|(tag, _)| *tag);
+    listed.iter().for_each(|(tag, x)| writeln!(text, "{tag} {} {} {}", x.x, x.y, x.z).unwrap());
     write!(text, "$EndNodes\n$Elements\n{}\n", elements.len()).unwrap();
-    for (number, nodes) in elements.iter().enumerate() {
-        write!(text, "{} {} 2 1 1", number + 1, cell.kinds[order]).unwrap();
+    for (number, (region, nodes)) in elements.iter().enumerate() {
+        write!(text, "{} {kind} 2 {region} {region}", number + 1).unwrap();
         nodes.iter().for_each(|node| write!(text, " {}", tag(*node)).unwrap());
         text.push('\n');
     }
     text + "$EndElements\n"
 }
 
-fn build(content: &str, material: Material, ground: GroundSpec) -> Object {
+pub fn build(content: &str, material: Material, ground: GroundSpec) -> Object {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("cells.msh");
     std::fs::write(&file, content).unwrap();

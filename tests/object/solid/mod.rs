@@ -4,6 +4,7 @@
 mod accuracy;
 mod bodies;
 mod cells;
+mod fitted;
 mod gmsh;
 mod indentation;
 mod lattice;
