@@ -1,10 +1,11 @@
 //! The paper's section 4.1 with its own iteration, and the comparison with the paper's numbers.
 use crate::common::scanned::scanned;
+use glam::DVec3;
 use haptize::{
     dataset::Dataset,
     device::Motion,
     gridize::{GridizeOptions, Interpolation, gridize},
-    paper::{Comparison, Row, Scanned, Scans, Sphere, Value, baked, procedure, specimen},
+    paper::{Comparison, PressedTwin, Row, Scanned, Scans, Sphere, Value, baked, procedure, specimen},
     render::{session, setup::Setup, trace::Trace},
     scene::{PlanSpec, ScanScene, Scene, Waypoint},
     sweep::SweepReport,
@@ -90,7 +91,10 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     assert!(page.contains("| 4.1 | nodes of the sphere | 102 | 102 | the same |"), "{page}");
     assert!(page.contains("| 3,472 | 320 | 5 x 8 lines of 8 levels |"), "{page}");
 
-    for canvas in [procedure(sphere, scans), specimen(scans)] {
+    let corners = [DVec3::ZERO, 0.05 * DVec3::X, 0.05 * DVec3::Y, 0.05 * DVec3::Z];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let twin = PressedTwin { nodes: corners.to_vec(), triangles, displacements: vec![0.0, 0.0, 0.0, 0.002] };
+    for canvas in [procedure(sphere, scans), specimen(scans, &twin)] {
         assert!(canvas.svg().contains("320"), "the number of this run's samples");
         let picture = canvas.pixels(1.0).unwrap();
         assert!(picture.pixels.iter().filter(|&&pixel| pixel != [255; 3]).count() > picture.pixels.len() / 30);

@@ -150,7 +150,7 @@ fn imported(file: &Path) -> Result<String, Error> {
     let robot = Robot::load(file)?;
     let tip = robot.links.iter().rev().find(|link| link.name != "camera").map_or("none", |link| &link.name);
     let arm = Arm::new(&robot, tip, &[])?;
-    let nodes = urdf::sample(&robot, &arm, 0.02, None)?;
+    let nodes = urdf::sample(&robot, &arm, Some(0.02), None)?;
     let (shapes, _) = urdf::drawn_shapes(&robot, &arm, None);
     urdf::write_scene(&robot, &arm, &nodes, &shapes, "haptize import")
 }
