@@ -33,6 +33,7 @@ fn given_in_a_hand(setup: &Setup) -> f64 {
 
 /// A coupling five times as stiff as Colgate's bound.
 const ACTIVE: &str = "[haptics]
+proxy_damping = [2.0, 2.0]
 coupling_stiffness = [20000.0, 20000.0]
 hand = { stiffness = [500.0, 500.0], damping = [1.0, 1.0] }
 ";
