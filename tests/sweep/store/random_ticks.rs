@@ -48,20 +48,25 @@ fn random_ticks_with_gains_at_their_bounds_give_nothing() {
         let mut of = |least: f64, greatest: f64| least * (greatest / least).powf(random.between(0.0, 1.0));
         let (share, times, mu) = (of(0.1, 0.45), [of(2e-3, 10.0), of(2e-3, 10.0)], of(0.05, 2.0));
         let (damping, damper) = (of(0.02, 2.0), of(0.05, 0.9));
-        let data = uneven(
-            joints,
-            &format!(
-                "[haptics]\ninterpolation = \"potential\"\ndevice_damping = {damping}\ncoupling_damping = {}\n\
-                 coupling_stiffness = {}\ntorque_limit = 1e6\ntorque_rate_limit = 1e9\n\
-                 [haptics.friction]\ncoefficient = {mu}\nstiffness = 5.0\n\
-                 [object.relaxation]\nterms = [[{share}, {}], [{share}, {}]]\ndent = 0.1\n",
-                damper * damping,
-                2.0 * (damping - damper * damping) / PERIOD,
-                times[0],
-                times[1]
-            ),
-        );
-        let setup = Setup::new(&data).unwrap();
+        let data = |proxy_damping: &str| {
+            uneven(
+                joints,
+                &format!(
+                    "[haptics]\ninterpolation = \"potential\"\ndevice_damping = {damping}\ncoupling_damping = {}\n\
+                     coupling_stiffness = {}\ntorque_limit = 1e6\ntorque_rate_limit = 1e9\n{proxy_damping}\
+                     [haptics.friction]\ncoefficient = {mu}\nstiffness = 5.0\n\
+                     [object.relaxation]\nterms = [[{share}, {}], [{share}, {}]]\ndent = 0.1\n",
+                    damper * damping,
+                    2.0 * (damping - damper * damping) / PERIOD,
+                    times[0],
+                    times[1]
+                ),
+            )
+        };
+        // What is left out is not less than the coupling asks for: here it is as little as is passive.
+        let setup = Setup::new(&data("")).unwrap();
+        let least = setup.bounds.last().unwrap().value * setup.scene.haptics.proxy_damping[0] * (1.0 + f64::EPSILON);
+        let setup = Setup::new(&data(&format!("proxy_damping = {least:?}\n"))).unwrap();
         let are_met = setup.bounds.iter().all(|bound| bound.value >= AT_ITS_BOUND * bound.safe);
         assert!(are_met && setup.bounds.len() == joints + 1, "{:?}", setup.bounds);
         assert!(setup.exceeded.is_empty(), "{:?}", setup.exceeded);
