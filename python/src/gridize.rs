@@ -8,6 +8,9 @@ use haptize::{
 use pyo3::{exceptions::PyValueError, prelude::*};
 use std::time::SystemTime;
 
+// The signature shows literals alone.
+const _: () = assert!(library::WITHIN == 1.5, "the default of `within` below is another one than the library's");
+
 /// Interpolate scattered torques on a uniform grid: linear on Delaunay simplices, absent outside their hull.
 ///
 /// q: configurations (rad; m), shape (n, d). tau: the torque measured at each (N m; N), the same shape. step: the
@@ -18,7 +21,7 @@ use std::time::SystemTime;
 #[pyfunction]
 #[pyo3(signature = (
     q, tau, step, *, deviations = None, names = None, units = None, epsilon = None, smooth = false,
-    interpolation = "linear", within = library::WITHIN
+    interpolation = "linear", within = 1.5
 ))]
 #[allow(clippy::too_many_arguments)] // As many as Python's caller may name.
 pub fn gridize(

@@ -31,7 +31,7 @@ const CLEAR: f64 = 1e-3;
 const SPONGE: Colour = Colour::hex(0xf2_d3_7d);
 const MEASURED: Colour = Colour::hex(0x00_72_b2);
 
-/// The twin of the block, scanned from above, where the arm pushes [hardest].
+/// The twin of the block, scanned from above, where the arm pushes hardest (see [`hardest`]).
 pub struct PressedTwin {
     /// Its nodes (m).
     pub nodes: Vec<DVec3>,

@@ -1,7 +1,7 @@
 //! The dataset of a real object with its twin: where torques were measured they are felt, and where none were the twin
 //! answers, solved in every tick ([`LiveScene`]).
 //!
-//! *Energy* [derivation]. With the share s of what was measured, the loop feels `U = s U_m + (1 - s) f U_t` and minus its
+//! *Energy*. With the share s of what was measured, the loop feels `U = s U_m + (1 - s) f U_t` and minus its
 //! gradient,
 //! `tau = s tau_m + (1 - s) f tau_t - (U_m - f U_t) ds/dq`,
 //! so that no closed way gives energy, across the border or along it. Both energies are zero where nothing touches: no
