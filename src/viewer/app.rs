@@ -442,7 +442,7 @@ pub fn not_drawn(error: ViewError) -> String {
     match error {
         ViewError::Gpu(GpuError::Lost(why)) => format!(
             "the GPU that draws this window was lost: {why}. The loop goes on; start haptize view again if the window \
-             does not open anew by itself, and update the driver if this comes back"
+             does not come back by itself, and update the driver if this comes back"
         ),
         other => other.to_string(),
     }
