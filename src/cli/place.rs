@@ -146,7 +146,9 @@ struct Placed {
 /// Returns what to do where the tip does not reach the point, or another part of the arm is in the way.
 fn refusal(placing: &Placing) -> Option<String> {
     if !placing.reaches() {
-        let [moved, centre] = [-placing.short, placing.centre - placing.short].map(|place| vector(place, 4));
+        // A little farther than the joints fall short, so that they need not be stretched to their ends.
+        let short = placing.short + placing.standoff * placing.short.normalize_or_zero();
+        let [moved, centre] = [-short, placing.centre - short].map(|place| vector(place, 4));
         return Some(format!(
             "move the object by {moved} m: centre = {centre}; or before the arm with --move; or widen the arm's limits"
         ));
