@@ -151,9 +151,9 @@ pub fn untaken(output: &Path, earlier: Option<&Replaced>) -> PathBuf {
     if now.is_none() || now == earlier.map(|earlier| earlier.written) {
         return output.to_owned();
     }
-    let [stem, ending] =
-        [output.file_stem(), output.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
-    let name = |number: u32| output.with_file_name(format!("{stem}-{number}.{ending}"));
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    let ending = output.extension().map_or(String::new(), |ending| format!(".{}", ending.to_string_lossy()));
+    let name = |number: u32| output.with_file_name(format!("{stem}-{number}{ending}"));
     let free = (2..=u32::MAX).map(name).find(|name| fs::symlink_metadata(name).is_err());
     let free = free.unwrap_or_else(|| output.to_owned());
     tell(format_args!(
