@@ -6,7 +6,7 @@
 use haptize::{
     contact::Status,
     dataset::JointLabel,
-    gridize::{GridizeOptions, Interpolation, Samples, gridize},
+    gridize::{GridizeOptions, Samples, gridize},
 };
 use std::{path::Path, process::Command, time::Instant};
 
@@ -32,13 +32,7 @@ fn compare(name: &str, point: fn(usize) -> [f64; 3]) {
         torques: tau.iter().flat_map(|&tau| [tau; 3]).collect(),
         deviations: None,
     };
-    let options = GridizeOptions {
-        steps: vec![STEP],
-        epsilon: Some(0.0),
-        interpolation: Interpolation::Linear,
-        smooth: false,
-        within: f64::INFINITY,
-    };
+    let options = GridizeOptions { epsilon: Some(0.0), within: f64::INFINITY, ..GridizeOptions::new(vec![STEP]) };
     let start = Instant::now();
     let Ok((dataset, _)) = gridize(&samples, &options) else { return println!("{name}: refused") };
     let seconds = start.elapsed().as_secs_f64();

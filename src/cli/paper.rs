@@ -20,7 +20,7 @@ use crate::{
     contact::{Model, Solver},
     dataset::{Dataset, replace_file},
     draw::canvas::Canvas,
-    gridize::{GridizeOptions, Interpolation},
+    gridize::GridizeOptions,
     object::Object,
     paper::{Comparison, PressedTwin, Scanned, Scans, Sphere, haptize, hardest, procedure, specimen},
     proxy::Chain,
@@ -290,12 +290,10 @@ impl Specimen {
         }
         let source = gridize::scanned(std::slice::from_ref(&log))?;
         let options = GridizeOptions {
-            steps: vec![STEP],
-            epsilon: source.epsilon,
-            interpolation: Interpolation::Linear,
-            smooth: false,
             // As in the paper the convex hull alone ends what was measured.
             within: f64::INFINITY,
+            epsilon: source.epsilon,
+            ..GridizeOptions::new(vec![STEP])
         };
         let (dataset, _) = source.gridize(&options)?;
         dataset.save(&folder.join(self.name).with_extension("haptize"))?;

@@ -229,7 +229,7 @@ impl Reversals<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{dataset::JointLabel, gridize, random::Random};
+    use crate::{dataset::JointLabel, random::Random};
 
     /// Friction of the drive and the other joint where the drive is at `q` (N m).
     fn half(q: f64) -> [f64; 2] {
@@ -264,14 +264,7 @@ mod tests {
     fn identified(histories: &[ForceHistory]) -> Dataset {
         let joints = ["drive", "other"].map(|name| JointLabel { name: name.into(), unit: "rad".into() });
         let reversals = Reversals { histories, lead: 0, cell: &[0.01, 0.01] };
-        let interpolation = gridize::Interpolation::Linear;
-        let options = GridizeOptions {
-            steps: vec![0.02],
-            epsilon: Some(0.0),
-            interpolation,
-            smooth: false,
-            within: f64::INFINITY,
-        };
+        let options = GridizeOptions { epsilon: Some(0.0), within: f64::INFINITY, ..GridizeOptions::new(vec![0.02]) };
         gridize_sliding(&joints, &reversals, &options).unwrap().0
     }
 

@@ -248,14 +248,7 @@ mod tests {
     fn a_log_that_never_rests_tells_the_terms_and_predicts_another_rate() {
         let samples =
             Samples { joints: vec![JointLabel { name: "a".into(), unit: "rad".into() }], ..Samples::default() };
-        let interpolation = crate::gridize::Interpolation::Linear;
-        let options = GridizeOptions {
-            steps: vec![0.02],
-            epsilon: Some(1e-3),
-            interpolation,
-            smooth: false,
-            within: f64::INFINITY,
-        };
+        let options = GridizeOptions { epsilon: Some(1e-3), within: f64::INFINITY, ..GridizeOptions::new(vec![0.02]) };
         let (dataset, _) = gridize_remembering(&samples, (&[log(0.005), log(0.1)], Past::Log), &options).unwrap();
         let found = dataset.provenance.relaxation.clone().unwrap();
         let identified = Identified { terms: found.terms.clone(), scale: 1.0 };

@@ -95,6 +95,15 @@ pub struct GridizeOptions {
     pub within: f64,
 }
 
+impl GridizeOptions {
+    /// A grid of these `steps` (rad or m): torques interpolated linearly and not smoothed, the threshold from the samples,
+    /// the region that of [`WITHIN`].
+    #[must_use]
+    pub fn new(steps: Vec<f64>) -> Self {
+        Self { steps, epsilon: None, interpolation: Interpolation::Linear, smooth: false, within: WITHIN }
+    }
+}
+
 /// Report of a gridization.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct GridizeReport {

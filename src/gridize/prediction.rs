@@ -89,7 +89,7 @@ fn predicted(dataset: &Dataset, q: &[f64]) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{dataset::JointLabel, gridize::Interpolation};
+    use crate::dataset::JointLabel;
 
     /// Samples of sin 4 q1 + q2 over a jittered lattice, each with an error of `noise` of one sign or the other.
     fn samples(noise: f64) -> Samples {
@@ -107,13 +107,7 @@ mod tests {
     }
 
     fn options() -> GridizeOptions {
-        GridizeOptions {
-            steps: vec![0.02],
-            epsilon: None,
-            interpolation: Interpolation::Linear,
-            smooth: false,
-            within: f64::INFINITY,
-        }
+        GridizeOptions { within: f64::INFINITY, ..GridizeOptions::new(vec![0.02]) }
     }
 
     #[test]

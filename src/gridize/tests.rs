@@ -39,13 +39,7 @@ fn lattice(side: usize, joints: usize, step: f64) -> Vec<Vec<f64>> {
 }
 
 fn options(step: f64) -> GridizeOptions {
-    GridizeOptions {
-        steps: vec![step],
-        epsilon: Some(0.0),
-        interpolation: Interpolation::Linear,
-        smooth: false,
-        within: f64::INFINITY,
-    }
+    GridizeOptions { epsilon: Some(0.0), within: f64::INFINITY, ..GridizeOptions::new(vec![step]) }
 }
 
 fn linear_field(q: &[f64]) -> f64 {

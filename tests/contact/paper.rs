@@ -4,7 +4,7 @@ use glam::DVec3;
 use haptize::{
     dataset::Dataset,
     device::Motion,
-    gridize::{GridizeOptions, Interpolation, gridize},
+    gridize::{GridizeOptions, gridize},
     paper::{Comparison, PressedTwin, Row, Scanned, Scans, Sphere, Value, baked, procedure, specimen},
     render::{session, setup::Setup, trace::Trace},
     scene::{PlanSpec, ScanScene, Scene, Waypoint},
@@ -62,13 +62,7 @@ fn the_table_says_what_is_the_same_and_what_differs() {
     let PlanSpec::Workspace(plan) = &mut part.scan.plan else { unreachable!() };
     (plan.start.y, plan.across[0].count, plan.across[1].count) = (-0.012, 5, 8);
     let samples = scanned(&part, 1);
-    let options = GridizeOptions {
-        steps: vec![0.03],
-        epsilon: Some(0.01),
-        interpolation: Interpolation::Linear,
-        smooth: false,
-        within: f64::INFINITY,
-    };
+    let options = GridizeOptions { epsilon: Some(0.01), within: f64::INFINITY, ..GridizeOptions::new(vec![0.03]) };
     let (mut block, report) = gridize(&samples, &options).unwrap();
     block.scene.clone_from(&part.text);
     let (setup, trace) = felt(&block, |setup| &setup.scene.motion.press);

@@ -118,13 +118,7 @@ fn strokes_in_a_recording_of_a_robot_tell_friction_as_those_in_a_table_do() {
     let [of_robot, of_table] = [recording, table].map(|path| import(&mapping, &[path], &mut |_| ()).unwrap());
     assert_eq!(of_robot.histories, of_table.histories);
     let reversals = Reversals { histories: &of_robot.histories, lead: 0, cell: &mapping.torque.cell };
-    let options = GridizeOptions {
-        steps: vec![0.05],
-        epsilon: None,
-        interpolation: haptize::gridize::Interpolation::Linear,
-        smooth: false,
-        within: f64::INFINITY,
-    };
+    let options = GridizeOptions { within: f64::INFINITY, ..GridizeOptions::new(vec![0.05]) };
     let (dataset, _) = gridize_sliding(&of_robot.samples.joints, &reversals, &options).unwrap();
     let forces = &dataset.slip.as_ref().unwrap().normal_force;
     assert!(forces.len() > 15 && forces.iter().all(|force| (f64::from(*force) / FRICTION - 1.0).abs() < 0.05));

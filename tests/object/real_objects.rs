@@ -6,7 +6,7 @@ use haptize::{
     dataset::Dataset,
     device::Motion,
     gridize::{
-        GridizeOptions, Interpolation, Reversals, gridize, gridize_sliding,
+        GridizeOptions, Reversals, gridize, gridize_sliding,
         prediction::{held_out, predict},
     },
     logs::{Imported, Keep, Mapping, import},
@@ -19,13 +19,7 @@ use std::path::PathBuf;
 const SEED: u64 = 1;
 
 fn options(step: f64, epsilon: f64) -> GridizeOptions {
-    GridizeOptions {
-        steps: vec![step],
-        epsilon: Some(epsilon),
-        interpolation: Interpolation::Linear,
-        smooth: false,
-        within: f64::INFINITY,
-    }
+    GridizeOptions { epsilon: Some(epsilon), within: f64::INFINITY, ..GridizeOptions::new(vec![step]) }
 }
 
 /// Scans the part of `datasets/NAME.toml` that `part` leaves of its plan, and gridizes it at the paper's 0.03 rad.

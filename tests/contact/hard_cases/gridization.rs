@@ -7,7 +7,7 @@ use crate::hard_cases::{Bound, Case, CaseResult, Effort, Failure, Setting};
 use haptize::{
     contact::Status,
     dataset::{Dataset, JointLabel},
-    gridize::{GridizeOptions, Interpolation, Samples, gridize},
+    gridize::{GridizeOptions, Samples, gridize},
 };
 use std::f64::consts::{PI, TAU};
 
@@ -55,13 +55,7 @@ fn samples(points: &[Point], torque: impl Fn(&[f64]) -> f64) -> Samples {
 }
 
 fn options(step: f64) -> GridizeOptions {
-    GridizeOptions {
-        steps: vec![step],
-        epsilon: Some(0.0),
-        interpolation: Interpolation::Linear,
-        smooth: false,
-        within: f64::INFINITY,
-    }
+    GridizeOptions { epsilon: Some(0.0), within: f64::INFINITY, ..GridizeOptions::new(vec![step]) }
 }
 
 /// Numbers between 0 and 1 without a visible pattern, the same in every run (fractions of a sine's large multiples).
