@@ -57,8 +57,12 @@ def test_scenes_datasets_and_fields_are_pickled_and_copied(scene, dataset):
         assert np.array_equal(other.torque(q), field.torque(q)) and other.torque(q)[1, 0] == -1.0
 
 
-def test_a_field_goes_to_a_process_that_was_spawned(field):
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
+@pytest.mark.parametrize("method", [method for method in ("spawn", "fork") if method in multiprocessing.get_all_start_methods()])
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_scenes_datasets_and_fields_go_to_other_processes(scene, dataset, field, method):
+    with multiprocessing.get_context(method).Pool(1) as pool:
+        assert pool.apply(getattr, (scene, "joints")) == scene.joints
+        assert np.array_equal(pool.apply(getattr, (dataset, "torque")), dataset.torque)
         assert np.array_equal(pool.apply(haptize.Field.torque, (field, PRESSED)), field.torque(PRESSED))
 
 
