@@ -3,5 +3,5 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 [ -x target/peers/bin/python ] || python3 -m venv target/peers
-target/peers/bin/pip install --quiet numpy scipy
+target/peers/bin/pip install --quiet numpy scipy interpn numba
 target/peers/bin/python -c 'import scipy; print("SciPy", scipy.__version__, "in target/peers")'

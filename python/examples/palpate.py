@@ -3,7 +3,7 @@
 The environment is Gymnasium's. The policy, a small network, is trained by evolution strategies (Salimans et al. 2017, arXiv:1703.03864) over
 batches of episodes, which takes two minutes of one processor core.
 
-    haptize bake datasets/nodule.toml && pip install gymnasium matplotlib && python palpate.py nodule.haptize palpation.png
+    haptize bake datasets/nodule.toml -o nodule.haptize && pip install gymnasium matplotlib && python palpate.py nodule.haptize palpation.png
 """
 
 import sys

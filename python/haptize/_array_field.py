@@ -59,10 +59,12 @@ class ArrayField:
         Bit a of a corner's number is its side along axis a. A q that is not a number leads to results that are none.
         """
         xp, joints = self.xp, self.start.shape[0]
-        beyond = xp.abs(q - xp.minimum(xp.maximum(q, self.start), self.last)) / self.step
+        # On a limit the derivative is that within, where minimum and maximum would take half of it.
+        inside = xp.where(q < self.start, self.start, xp.where(q > self.last, self.last, q))
+        beyond = xp.abs(q - inside) / self.step
         fades = xp.where(beyond < 1, 1 - beyond, xp.zeros_like(beyond))
         fade = reduce(xp.minimum, [fades[..., a] for a in range(joints)])
-        steps = xp.minimum(xp.maximum((q - self.start) / self.step, xp.zeros_like(q)), self.count - 1 + xp.zeros_like(q))
+        steps = (inside - self.start) / self.step
         number = xp.where(xp.isnan(steps), xp.zeros_like(steps), steps)
         last_cell = xp.maximum(self.count - 2, xp.zeros_like(self.count))
         low = xp.minimum(self._integers(xp.floor(number)), last_cell)

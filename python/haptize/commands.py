@@ -30,6 +30,7 @@ def run(command: str, *files: str | PathLike[str], **options: Any) -> dict[str, 
         report: dict[str, Any] = json.loads(done.stdout)
     except ValueError:
         raise Error(f"`haptize {command}` ended with code {done.returncode} and no report") from None
-    if "error" in report:
+    # A failure is a sentence; the error of an interpolation is a number.
+    if isinstance(report.get("error"), str):
         raise Error(report["error"])
     return report

@@ -68,6 +68,6 @@ tested() {
 
 tested "$oldest" 'numpy<2'
 rm -rf "$place/test"
-tested "$newest" 'numpy>=2' mypy matplotlib h5py h5netcdf xarray
-echo 'skipped: haptize.torch, haptize.jax and the environment of Gymnasium; bash python/tests/learners.sh tests them'
+tested "$newest" 'numpy>=2' mypy matplotlib h5py h5netcdf netCDF4 xarray gymnasium 'jax==0.10.2; python_version >= "3.11"'
+echo 'skipped: haptize.torch, since PyTorch is gigabytes; bash python/tests/torch.sh WHEEL tests it'
 cd "$place" && test/bin/stubtest haptize._haptize
