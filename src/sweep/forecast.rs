@@ -3,10 +3,7 @@
 //! Points of the grid are drawn at random. Those that are not free with their neighbours are solved by the sweep's own
 //! backend. The fraction in contact, the number of contact forces and the time per point follow.
 
-use super::{
-    Backend, Sweep,
-    columns::{self, Shape},
-};
+use super::{Backend, Sweep, tile::Shape};
 use crate::random::Random;
 use serde::Serialize;
 use std::time::Instant;
@@ -104,7 +101,7 @@ impl Sweep<'_> {
         let seconds = per_sample * solving;
         let bytes = |shape: Shape| {
             let contacts = if shape.extras.forces { (per_sample * contacts as f64).round() as usize } else { 0 };
-            columns::size(points, shape, contacts)
+            shape.size(points, contacts)
         };
         Ok(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,

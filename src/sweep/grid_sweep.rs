@@ -6,16 +6,16 @@
 use super::{
     Backend, ChosenBackend, Footprint, Forecast, FreeSpace, SweepReport,
     assembly::{self, Results},
-    chunks::{Begun, Solved, together},
-    columns::{Columns, Shape},
+    chunks::{Begun, Solved, Store, together},
     error::{in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
     footprint::{self, Bounds},
     lowest,
     measured::{ErrorCheck, MOST_CONFIGURATIONS},
     part::{Binding, Part},
     shard::Shard,
-    table::{Block, Table},
+    table::Table,
     tally::Tally,
+    tile::Shape,
 };
 use crate::{
     Error, MAX_AXES,
@@ -278,19 +278,17 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// When there is no memory, the backend fails, or the sweep is stopped.
     pub fn run<B: Backend>(&self, backend: &mut B, mut run: Run<'_>) -> Result<(Dataset, SweepReport), Error> {
-        let footprint = self.footprint(run.chunk, true);
-        let (points, bytes) = (self.grid.points(), footprint.memory.least);
+        let (points, bytes) = (self.grid.points(), self.footprint(run.chunk, true).memory.least);
         memory::check(bytes).map_err(|shortage| {
             error!(
                 "the grid's {points} points do not fit in memory: {shortage}; or haptize into a file (`haptize bake`), \
                  which takes little memory whatever the grid"
             )
         })?;
-        let mut chunks: Vec<(usize, Columns)> = Vec::new();
+        let mut tiles = Vec::new();
         let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut chunks)?;
-        let blocks = chunks.iter().map(|(first, columns)| Block::of(columns, *first)).collect();
-        let mut table = Table::new(self.shape, blocks);
+        let solved = self.solve(backend, &mut run, begun, Store::Memory(&mut tiles))?;
+        let mut table = Table::new(self.shape, tiles);
         let (report, provenance) = self.complete(solved, &mut table, run.stop, None)?;
         // Nothing stops it halfway.
         let never = AtomicBool::new(false);
@@ -330,7 +328,6 @@ impl<'a> Sweep<'a> {
             part.note(&notice)?;
             provenance.notices.push(notice);
         }
-        let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance };
         let stop = run.stop;
         let kept_in = part.path().to_path_buf();
@@ -341,7 +338,7 @@ impl<'a> Sweep<'a> {
             let part = kept_in.display();
             error!("{why}; all points are kept in {part}: afterwards give the same command, a bake with --resume")
         };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
+        let solved = self.solve(backend, &mut run, begun, Store::Part(&mut part))?;
         let map = part.map().map_err(|source| in_part(&kept_in, &source))?;
         let mut table = part.table(&map, self.shape)?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
@@ -389,7 +386,8 @@ impl<'a> Sweep<'a> {
         if let Some(model) = self.lowest {
             let lowered = lowest::correct(&self.grid, model, self.shape, table, stop).ok_or_else(stopped)?;
             if lowered.points > 0 {
-                solved.tally = Tally::of(table, points);
+                solved.tally = Tally::default();
+                table.runs(0..points).for_each(|(tile, rows)| solved.tally.add(tile, rows));
             }
             solved.facts.lowered = Some(lowered);
         }

@@ -11,12 +11,7 @@
 //! An interpolation is formed of the whole grid where that has at most [`WHOLE`] points, else of the grid lines around
 //! each configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
 
-use super::{
-    lowest,
-    reference::Reference,
-    table::{PointResult, Table},
-    thin_parts,
-};
+use super::{lowest, reference::Reference, table::Table, thin_parts, tile::PointResult};
 use crate::{
     Error, JointVector,
     contact::{Model, Solvers, Status},
@@ -331,23 +326,20 @@ mod tests {
         contact::Equilibrium,
         dataset::Extras,
         fixtures::grids,
-        sweep::{
-            columns::{Columns, Shape},
-            table::Block,
-        },
+        sweep::tile::{Shape, Tile},
     };
 
     const SHAPE: Shape =
         Shape { joints: 2, surface_nodes: 0, extras: Extras { forces: false, tangent: false, slip: false } };
 
     /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
-    fn columns(grid: &Grid) -> Columns {
-        let mut columns = Columns::default();
+    fn tile(grid: &Grid) -> Tile<'static> {
+        let mut tile = Tile::default();
         for point in 0..grid.points() {
             let q = grid.configuration(point);
             let depth = (q[0] - 0.35).max(0.0);
             let status = if depth > 0.0 { Status::Contact } else { Status::Free };
-            columns.push(
+            tile.push(
                 &Equilibrium {
                     status,
                     iterations: 1,
@@ -366,14 +358,13 @@ mod tests {
                 SHAPE,
             );
         }
-        columns
+        tile
     }
 
     #[test]
     fn configurations_are_spread_evenly_over_the_cells_in_contact() {
         let grid = grids::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
-        let columns = columns(&grid);
-        let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE, vec![tile(&grid)]);
         // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
         let places = places(&grid, &table, 16, 1200, DRAWS);
         assert_eq!(places.len(), 1200);
@@ -402,16 +393,16 @@ mod tests {
         let grid = grids::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
         let norm = EffortNorm::new(["rad", "rad"]);
         let share = |leap: f64| {
-            let mut columns = Columns::default();
+            let mut tile = Tile::default();
             for point in 0..grid.points() {
                 let q = grid.configuration(point);
                 let mut equilibrium = Equilibrium::free(-0.01, 2);
                 equilibrium.status = Status::Contact;
                 equilibrium.energy = 0.5 * q[0] * q[0] + if q[0] > 0.25 { leap } else { 0.0 };
                 equilibrium.torque = JointVector::from_slice(&[-q[0], 0.0]);
-                columns.push(&equilibrium, SHAPE);
+                tile.push(&equilibrium, SHAPE);
             }
-            let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
+            let table = Table::new(SHAPE, vec![tile]);
             let places = places(&grid, &table, 32, 700, DRAWS);
             let mut equilibrium = Equilibrium::free(0.0, 2);
             equilibrium.torque[0] = 0.5;
@@ -427,8 +418,7 @@ mod tests {
     #[test]
     fn a_window_around_a_configuration_gives_what_the_whole_grid_gives() {
         let grid = grids::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
-        let columns = columns(&grid);
-        let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE, vec![tile(&grid)]);
         let places = places(&grid, &table, 54 * 80, 50, DRAWS);
         let places: Vec<&Place> = places.iter().collect();
         let slope = JointVector::from_slice(&[1e3, 1e3]);

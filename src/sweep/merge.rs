@@ -1,6 +1,6 @@
 //! The shards of a sweep, read, compared, and put together into the dataset that one bake would have made.
 //!
-//! Blocks of points are copied in the order of the grid into the part of the output, which then lacks nothing: what
+//! Tiles are copied in the order of the grid into the part of the output, which then lacks nothing: what
 //! follows (the lowest equilibria, the error, the file) is what a bake does that is continued after its last point. So
 //! the dataset has the same bits.
 
@@ -12,7 +12,7 @@ use super::{
     grid_sweep::Sweep,
     part::{Binding, Found, Part},
     shard::{EXTENSION, ranges},
-    table::Block,
+    tile::Tile,
 };
 use crate::{Error, ErrorKind, JointVector, contact::Equilibrium, error, input, proxy::Chain, scene::Scene};
 use memmap2::Mmap;
@@ -183,18 +183,17 @@ impl Merge {
         let path = Sweep::part_of(output);
         let mut binding = sweep.binding();
         let (mut part, tally) = Part::open(&path, true, &mut binding)?;
-        let mut blocks: Vec<Block<'_>> =
-            self.shards.values().flat_map(|shard| shard.found.blocks(&shard.map)).collect();
-        blocks.sort_unstable_by_key(|block| block.first);
-        let begin = blocks.partition_point(|block| block.first < tally.points);
-        let next = blocks.get(begin).map_or(binding.points(), |block| block.first);
+        let mut tiles: Vec<Tile<'_>> = self.shards.values().flat_map(|shard| shard.found.tiles(&shard.map)).collect();
+        tiles.sort_unstable_by_key(|tile| tile.first);
+        let begin = tiles.partition_point(|tile| tile.first < tally.points);
+        let next = tiles.get(begin).map_or(binding.points(), |tile| tile.first);
         if next != tally.points {
             let what = "holds what an unfinished bake or a merge of other shards has left; delete it, or choose another \
                         output";
             return Err(Error::at(&path, what));
         }
-        for block in &blocks[begin..] {
-            part.append(block)?;
+        for tile in &tiles[begin..] {
+            part.append(tile)?;
         }
         for notice in self.notices().get(binding.provenance.notices.len()..).unwrap_or_default() {
             part.note(notice)?;

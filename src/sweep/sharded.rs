@@ -2,7 +2,7 @@
 
 use super::{
     Backend, Run, Shard, Sweep, SweepReport,
-    chunks::Begun,
+    chunks::{Begun, Store},
     error::{foreign, unwritable},
     merge::Contents,
     part::Part,
@@ -63,9 +63,8 @@ impl Sweep<'_> {
             let _ = fs::remove_file(&part_path);
             return Ok((file, None));
         }
-        let footprint = self.footprint(run.chunk, false);
         let begun = Begun { tally, provenance: binding.provenance };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
+        let solved = self.solve(backend, &mut run, begun, Store::Part(&mut part))?;
         part.finish(&file)?;
         Ok((file, Some(self.report(solved).0)))
     }
