@@ -66,12 +66,6 @@ impl Store<'_> {
     }
 }
 
-/// State of a sweep before a run.
-pub(super) struct Begun {
-    pub tally: Tally,
-    pub provenance: Provenance,
-}
-
 /// Results of a run.
 pub(super) struct Solved {
     pub tally: Tally,
@@ -130,12 +124,12 @@ impl Chunk {
 }
 
 impl Sweep<'_> {
-    /// Solves the points that `begun` lacks.
+    /// Solves the points that `tally` has not counted.
     pub(super) fn solve<B: Backend>(
         &self,
         backend: &mut B,
         run: &mut Run<'_>,
-        begun: Begun,
+        (tally, provenance): (Tally, Provenance),
         mut store: Store<'_>,
     ) -> Result<Solved, Error> {
         let part = if let Store::Part(part) = &store { Some(part.path().to_path_buf()) } else { None };
@@ -154,24 +148,23 @@ impl Sweep<'_> {
                      processes and memory (ulimit -u, ulimit -v)"
                 )
             })?;
-            let solved = self.solve_chunks(backend, run, begun, part, (entries, room));
+            let solved = self.solve_chunks(backend, run, (tally, provenance), part, (entries, room));
             // What a store says comes first: a sweep whose store has failed only knows that nobody takes its results.
             keeper.join().unwrap_or_else(|panic| resume_unwind(panic))?;
             solved
         })
     }
 
-    /// Solves the points that `begun` lacks, and sends what is to be kept; `part` is where that is.
+    /// Solves the points that `tally` has not counted, and sends what is to be kept; `part` is where that is.
     fn solve_chunks<B: Backend>(
         &self,
         backend: &mut B,
         run: &mut Run<'_>,
-        begun: Begun,
+        (tally, provenance): (Tally, Provenance),
         part: Option<PathBuf>,
         (entries, room): (SyncSender<Entry>, Receiver<Tile<'static>>),
     ) -> Result<Solved, Error> {
         let (start, left_before) = (Instant::now(), backend.left_to_cpu());
-        let Begun { tally, provenance } = begun;
         let resumed = tally.points;
         let footprint = self.footprint(run.chunk, part.is_none());
         let mut course = Course {
@@ -261,7 +254,7 @@ impl Course<'_, '_> {
             rate: (tally.points - self.resumed) as f64 / seconds,
             footprint: self.footprint,
             forecast: self.sweep.forecast,
-            mesh_ripple: self.sweep.mesh_ripple(),
+            mesh_ripple: self.sweep.binding.provenance.mesh_ripple,
         });
     }
 
@@ -271,7 +264,7 @@ impl Course<'_, '_> {
 
     /// The points that are left to cut off, as far as they are consecutive.
     fn rest(&self) -> Range<usize> {
-        self.sweep.shard.rest(self.sweep.grid.points(), self.cut)
+        self.sweep.binding.shard.rest(self.sweep.binding.grid.points(), self.cut)
     }
 
     /// Looks for free space about the next point, if that was not done.
@@ -320,7 +313,7 @@ impl Course<'_, '_> {
         }
         let mut tile = self.room.recv().map_err(|_| self.stopped())?;
         tile.clear(chunk.points.start);
-        let shape = self.sweep.shape;
+        let shape = self.sweep.binding.shape;
         let mut equilibria = equilibria.iter();
         for point in chunk.points.clone() {
             match chunk.free_gap(point) {
@@ -371,7 +364,7 @@ impl Work for Course<'_, '_> {
         }
         let chunk = self.chunks.get(self.given)?;
         self.given += 1;
-        Some(chunk.solved().map(|point| self.sweep.grid.configuration(point)).collect())
+        Some(chunk.solved().map(|point| self.sweep.binding.grid.configuration(point)).collect())
     }
 
     fn rewind(&mut self) {

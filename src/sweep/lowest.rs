@@ -329,12 +329,9 @@ mod tests {
             iterations: 3,
             residual: 1e-9,
             energy,
-            gap: -1.0,
-            tangent: None,
             torque: JointVector::from_slice(&[torque]),
             forces: (0..energy as u32).map(force).collect(),
-            slip: None,
-            touches: Vec::new(),
+            ..Equilibrium::free(-1.0, 1)
         }
     }
 
