@@ -159,7 +159,8 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// When the model's proxy has other joints.
     pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), Error> {
-        self.model = Some(self.fitting(model)?);
+        // The depth below a rounded surface may change by more than its node moves.
+        self.model = Some(self.fitting(model)?).filter(|model| model.rounded.is_none());
         Ok(())
     }
 

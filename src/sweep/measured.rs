@@ -18,7 +18,7 @@ use crate::{
     dataset::{Axis, Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
     field::TorqueField,
     random::{Random, mix},
-    scene::{ContactLaw, ContactSpec, EffortNorm, Interpolation},
+    scene::{ContactLaw, EffortNorm, Interpolation},
 };
 use rayon::prelude::*;
 use std::{
@@ -142,7 +142,7 @@ impl ErrorCheck<'_> {
         if contact.law != ContactLaw::Rest {
             return None;
         }
-        let mut following = self.model.with_contact(ContactSpec { law: ContactLaw::Following, ..contact });
+        let mut following = self.model.with_contact(contact.by(ContactLaw::Following));
         (following.with_tangent, following.with_slip) = (false, false);
         let solvers = Solvers::new(&following, rayon::current_num_threads());
         let solved = solvers.map(&reference.places, |solver, q| solver.solve(q));
