@@ -82,7 +82,7 @@ pub struct Arguments {
 /// continues.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut scene = Scene::load(&arguments.scene)?;
-    scene.contact.law = arguments.law.unwrap_or(scene.contact.law);
+    scene.contact = scene.contact.by(arguments.law.unwrap_or(scene.contact.law));
     if let Some(shard) = arguments.shard {
         return run_shard(arguments, &scene, shard.shard(|name| std::env::var(name).ok())?);
     }

@@ -215,7 +215,11 @@ fn felt(dataset: &Dataset, motion: &str) -> Result<(Setup, Arc<Trace>), Failure>
 /// The twin of the bare block that was scanned in `folder`, where the arm pushes hardest.
 fn pressed_twin(folder: &Path, scans: Scans<'_>) -> Result<PressedTwin, Failure> {
     let mesh = folder.join("sponge_twin.obj");
-    let twin = Twinned::new((&folder.join("sponge.csv"), Some(SPONGE_GROUND)), None, &mesh.with_extension("toml"))?;
+    let twin = Twinned::new(
+        (&folder.join("sponge.csv"), Some(SPONGE_GROUND)),
+        crate::twin::Given::default(),
+        &mesh.with_extension("toml"),
+    )?;
     let (object, chain) = (Object::build(&twin.scene.object)?, Chain::new(&twin.scene.proxy));
     let q: Vec<JointVector> = hardest(scans.bare).into_iter().collect();
     let model = Model::reaching(&object, &chain, twin.scene.contact, &q)?;

@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     write(&output, shape.obj().as_bytes())?;
     write(&picture, &surface(&shape).pixels(PIXELS)?.png()?)?;
     let nodes = Chain::new(&scan.proxy).nodes.len();
-    Report::new(&Found { replaced, ..Found::new((&approaches, nodes), &shape, &output, &picture) })
+    Report::new(&Found { replaced, ..Found::new((&approaches, nodes), (&shape, arguments.ground), &output, &picture) })
 }
 
 /// The shape of what `log` scanned, with the approaches and the scene of the scan.
@@ -93,8 +93,9 @@ pub struct Found {
     held_out: f64,
     deviation: f64,
     carving: Carving,
-    /// Height of the ground (m).
+    /// Height of the ground (m), and whether it was given.
     ground: f64,
+    ground_is_given: bool,
     /// Contact nodes of the arm.
     arm_nodes: usize,
     nodes: usize,
@@ -107,7 +108,7 @@ impl Found {
     /// What is told of `shape`.
     pub fn new(
         (approaches, arm_nodes): (&Approaches, usize),
-        shape: &ScannedShape,
+        (shape, ground): (&ScannedShape, Option<f64>),
         output: &Path,
         picture: &Path,
     ) -> Self {
@@ -123,6 +124,7 @@ impl Found {
             deviation: shape.deviation(),
             carving: shape.carving,
             ground: shape.ground,
+            ground_is_given: ground.is_some(),
             arm_nodes,
             nodes: shape.nodes.len(),
             triangles: shape.triangles.len(),
@@ -134,7 +136,7 @@ impl Found {
 impl Describe for Found {
     fn describe(&self, text: &mut Text) {
         let Self { file, picture, onsets, untouched, begun, exponent, spacing, held_out, deviation, .. } = self;
-        let Self { carving, ground, arm_nodes, nodes, triangles, replaced, .. } = self;
+        let Self { carving, ground, ground_is_given, arm_nodes, nodes, triangles, replaced, .. } = self;
         let mm = |length: &f64| 1e3 * length;
         text.line(format_args!("{file}: a surface of {nodes} nodes and {triangles} triangles"));
         let others = match begun {
@@ -153,7 +155,8 @@ impl Describe for Found {
         );
         let Carving { places, carved } = carving;
         text.row("carving", format_args!("{places} free places of nodes, {carved} of which moved the surface"));
-        text.row("ground", format_args!("z = {ground:.4} m"));
+        let guess = "a guess, one spacing below the lowest place that was reached: give its height by --ground";
+        text.row("ground", format_args!("z = {ground:.4} m, {}", if *ground_is_given { "as given" } else { guess }));
         if *arm_nodes > 1 {
             let note = "the node that goes before the others, or lies nearest to the surface, is taken to touch: where a link \
                         leans on the object, another may";

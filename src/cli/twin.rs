@@ -7,16 +7,16 @@ use super::{
     output::{self, Content},
     report::{Describe, Report, Text},
     shape::{Found, found, write},
-    shell,
+    shell, tell,
 };
 use crate::{
     JointVector,
     contact::Model,
-    object::Object,
+    object::{LatticeError, Object},
     proxy::Chain,
     report::{PIXELS, scanned::stiffness},
     scene::{Material, Scene},
-    twin::{Approaches, Modulus, ScannedShape, Watched, twin_scene},
+    twin::{Approaches, Given, KnownRange, Modulus, ScannedShape, Watched, twin_scene},
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -38,18 +38,24 @@ pub struct Arguments {
     /// makes the object softer.
     #[arg(long, value_name = "W", value_parser = length, allow_negative_numbers = true)]
     width: Option<f64>,
+    /// Edge of the cubes that fill the object (m); by default as its surface asks for.
+    #[arg(long, value_name = "H", value_parser = length, allow_negative_numbers = true)]
+    cell: Option<f64>,
     /// The scene to write, which must not be there yet; by default the log's name in the current folder, ending in
     /// _twin.toml. Its surface (.obj) and a picture (.png) are written beside it.
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
 
+/// Misfit over the measured torque from which on it is warned of (1): twice that of elastic bodies (docs/scanned.md).
+const MISFIT: f64 = 0.1;
+
 /// Young's modulus from which the search begins (Pa): that of soft tissue.
 const YOUNG: f64 = 1e4;
 
 fn length(text: &str) -> Result<f64, String> {
-    let width: f64 = text.trim().parse().map_err(|_| format!("{text:?} is no number"))?;
-    if width > 0.0 && width.is_finite() { Ok(width) } else { Err("a width is positive".into()) }
+    let length: f64 = text.trim().parse().map_err(|_| format!("{text:?} is no number"))?;
+    if length > 0.0 && length.is_finite() { Ok(length) } else { Err("a length is positive".into()) }
 }
 
 /// Finds surface and modulus, and writes the scene.
@@ -69,14 +75,18 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     for file in [&mesh, &picture] {
         output::check(file, Content::Product, [arguments.log.as_path()])?;
     }
-    let Twinned { approaches, shape, modulus, scene } =
-        Twinned::new((&arguments.log, arguments.ground), arguments.width, &output)?;
+    let given = Given { width: arguments.width, cell: arguments.cell };
+    let Twinned { approaches, shape, modulus, range, lattice, scene } =
+        Twinned::new((&arguments.log, arguments.ground), given, &output)?;
     write(&picture, &stiffness(&shape, &modulus).pixels(PIXELS)?.png()?)?;
     import::write(&output, &scene.text)?;
     let nodes = Chain::new(&scene.proxy).nodes.len();
-    let shape = Found::new((&approaches, nodes), &shape, &mesh, &picture);
-    let (poisson, width) = given(&scene);
-    Report::new(&Twin { scene: output.display().to_string(), modulus, poisson, width, shape })
+    let shape = Found::new((&approaches, nodes), (&shape, arguments.ground), &mesh, &picture);
+    let (poisson, width) = taken(&scene);
+    let joints = scene.proxy.joints.iter().map(|joint| joint.name.clone()).collect();
+    let twin = Twin { scene: output.display().to_string(), modulus, poisson, width, joints, range, lattice, shape };
+    twin.doubts().iter().for_each(|doubt| tell(format_args!("haptize: {doubt}")));
+    Report::new(&twin)
 }
 
 /// What explains a scan.
@@ -84,38 +94,44 @@ pub struct Twinned {
     approaches: Approaches,
     shape: ScannedShape,
     modulus: Modulus,
+    range: KnownRange,
+    lattice: Option<LatticeError>,
     /// With the modulus that was found.
     pub scene: Scene,
 }
 
 impl Twinned {
-    /// Explains `log` over a ground at a height (m) with a skin of `width` (m), as the scene `output`, beside which the mesh is
+    /// Explains `log` over a ground at a height (m) with what is `given`, as the scene `output`, beside which the mesh is
     /// written. The scene is not.
-    pub fn new((log, ground): (&Path, Option<f64>), width: Option<f64>, output: &Path) -> Result<Self, Failure> {
+    pub fn new((log, ground): (&Path, Option<f64>), given: Given, output: &Path) -> Result<Self, Failure> {
         let (approaches, scan, shape) = found(log, ground)?;
         let mesh = output.with_extension("obj");
         write(&mesh, shape.obj().as_bytes())?;
         let name = mesh.file_name().unwrap_or_default().to_string_lossy();
-        let of_modulus =
-            |young: f64| twin_scene((&scan.text, output), (&mesh, &*name), (&shape, &approaches), young, width);
-        let scene = of_modulus(YOUNG)?;
-        let (object, chain) = (Object::build(&scene.object)?, Chain::new(&scene.proxy));
+        let scene = |young: f64, range: &KnownRange| {
+            twin_scene((&scan.text, output), (&mesh, &*name), (&shape, range), young, given)
+        };
+        let around = KnownRange::around(&approaches);
+        let first = scene(YOUNG, &around)?;
+        let (object, chain) = (Object::build(&first.object)?, Chain::new(&first.proxy));
         let bar = Bar::new("rows", "{wide_bar} {pos}/{len} rows, {eta} left");
         let mut progress = |done: usize, rows: usize| bar.set(done as u64, rows as u64, String::new());
         let watched = &mut Watched { stop: interrupt::stop_flag(), progress: &mut progress };
         let rows: Vec<JointVector> = approaches.contact.iter().map(|row| row.q).collect();
-        let mut model = Model::reaching(&object, &chain, scene.contact, &rows)?;
+        let mut model = Model::reaching(&object, &chain, first.contact, &rows)?;
         let modulus = Modulus::fit(&mut model, YOUNG, (&approaches, &shape), watched);
         bar.finish();
         interrupt::over();
         let modulus = modulus.map_err(|error| error.within(log.display()))?;
-        let scene = of_modulus(modulus.young)?;
-        Ok(Self { approaches, shape, modulus, scene })
+        let range = around.no_deeper(modulus.deepest, &shape, &chain);
+        let lattice = object.lattice_error(&model.compliance);
+        let scene = scene(modulus.young, &range)?;
+        Ok(Self { approaches, shape, modulus, range, lattice, scene })
     }
 }
 
 /// Poisson's ratio of the object of `scene` (1), and the width of its skin (m; see [`crate::scene::SkinSpec`]).
-fn given(scene: &Scene) -> (f64, f64) {
+fn taken(scene: &Scene) -> (f64, f64) {
     let Material::Elastic(elastic) = &scene.object.material else { return (0.0, 0.0) };
     let bending = scene.object.skin.map_or(0.0, |skin| skin.bending);
     (elastic.poisson, (2.0 * (1.0 - elastic.poisson * elastic.poisson) * bending / elastic.young).cbrt())
@@ -130,12 +146,52 @@ struct Twin {
     /// What is taken for given: Poisson's ratio (1), width of the skin (m).
     poisson: f64,
     width: f64,
+    /// Names of the joints.
+    #[serde(skip)]
+    joints: Vec<String>,
+    range: KnownRange,
+    /// Error that the cubes make.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lattice: Option<LatticeError>,
     shape: Found,
+}
+
+impl Twin {
+    /// What a person should know before taking the twin for the object, a sentence each.
+    fn doubts(&self) -> Vec<String> {
+        let Modulus { misfit, torque, rows, counted, deepest, .. } = self.modulus;
+        let mut doubts = Vec::new();
+        if misfit > MISFIT * torque {
+            doubts.push(format!(
+                "the twin leaves {:.0} % of the measured torque unexplained: the object is no linear elastic solid, or the ground \
+                 is another (--ground): feel the scan itself, and the twin beyond it (haptize play DATASET --twin)",
+                100.0 * misfit / torque
+            ));
+        }
+        if 2 * counted < rows {
+            doubts.push(format!(
+                "{} of {rows} rows in contact say nothing of the twin, as the surface closest to the arm is none that was touched: \
+                 it is at a border, or past the middle of the body; the grid leaves out what is deeper than {:.1} mm",
+                rows - counted,
+                1e3 * deepest
+            ));
+        }
+        if let Some(lattice) = self.lattice.filter(LatticeError::is_large) {
+            doubts.push(format!(
+                "the lattice is coarse: cubes of {:.2} mm make its compliance err by an estimated {:.1} %, which the modulus makes \
+                 up for on the whole, and not place by place: find it again with smaller cubes, --cell {:.4}",
+                1e3 * lattice.cell,
+                100.0 * lattice.relative,
+                0.5 * lattice.cell
+            ));
+        }
+        doubts
+    }
 }
 
 impl Describe for Twin {
     fn describe(&self, text: &mut Text) {
-        let Self { scene, modulus, poisson, width, shape } = self;
+        let Self { scene, modulus, poisson, width, joints, range, shape, .. } = self;
         let Modulus { young, deviation, friction, misfit, torque, rows, counted, .. } = modulus;
         shape.describe(text);
         text.line(format_args!("{scene}: an elastic solid in this surface"));
@@ -155,6 +211,15 @@ impl Describe for Twin {
                 100.0 * misfit / torque
             ),
         );
+        let ranges: Vec<String> = (joints.iter().zip(&range.joints))
+            .map(|(joint, [low, high])| format!("{joint} {low:.3} to {high:.3}"))
+            .collect();
+        let deep = 1e3 * modulus.deepest;
+        text.row(
+            "grid",
+            format_args!("{}: up to {deep:.1} mm deep, as the deepest row that counts", ranges.join(", ")),
+        );
+        text.row("gains", "those of the scan, but for proxy_damping: as much as the twin's torque needs to be passive");
         text.row("next", format_args!("haptize play {}", shell::file(Path::new(scene))));
     }
 }

@@ -12,7 +12,6 @@
 
 mod deformation;
 
-use super::geometry::RestSurface;
 use super::geometry::facet::Facet;
 use super::geometry::nearest::Closest;
 use super::law::depth::{Carriers, Contact, measure};
@@ -106,7 +105,7 @@ impl Detection {
                 if known.distance > 0.0 && known.distance - radius > gap {
                     continue;
                 }
-                find_at_rest(&model.surface, self.nodes[i], known);
+                find_at_rest(model, self.nodes[i], known);
             }
             gap = gap.min(known.signed() - radius);
         }
@@ -130,7 +129,7 @@ impl Detection {
                 known.closest = None;
                 known.inside = false;
                 let (bound, near) = model.surface.distance_bound(x);
-                known.distance = bound;
+                known.distance = bound - model.rounded.as_ref().map_or(0.0, |rounded| rounded.blur());
                 known.last = near.filter(|_| !is_near).unwrap_or(known.last);
             }
             let clearance = known.signed() - model.chain.nodes[i].radius;
@@ -165,7 +164,7 @@ impl Detection {
                 continue;
             }
             if known.closest.is_none() {
-                find_at_rest(&model.surface, x, known);
+                find_at_rest(model, x, known);
                 if !known.inside && known.distance - radius > moved {
                     continue;
                 }
@@ -231,8 +230,16 @@ impl Detection {
         if !known.inside && known.distance - radius > reach {
             return None;
         }
-        let closest = known.closest.unwrap_or_else(|| find_at_rest(&model.surface, x, known));
-        row_at_rest(model, i, x, &closest).filter(|row| row.depth >= -reach)
+        let closest = known.closest.unwrap_or_else(|| find_at_rest(model, x, known));
+        let row = match &model.rounded {
+            None => row_at_rest(model, i, x, &closest),
+            // Found before the rounded surface, or beyond its lattice.
+            Some(_) if closest.triangle == u32::MAX => {
+                Some(Contact { share: model.shares[i], ..Contact::rounded(i as u32, radius - known.signed()) })
+            }
+            Some(_) => None,
+        };
+        row.filter(|row| row.depth >= -reach)
     }
 
     /// The row of the place `x` next to the node (m), before the feature that is closest to the node, which is continued
@@ -244,8 +251,15 @@ impl Detection {
     }
 }
 
-/// Closest feature at rest; notes distance and side.
-fn find_at_rest(surface: &RestSurface, x: DVec3, known: &mut RestDistance) -> Closest {
+/// Closest feature at rest; notes distance and side. Those of the rounded surface, which has no features, where there is
+/// one.
+fn find_at_rest(model: &Model, x: DVec3, known: &mut RestDistance) -> Closest {
+    let surface = &model.surface;
+    if let Some(depth) = model.rounded.as_ref().and_then(|rounded| rounded.depth(x)) {
+        let nothing = Closest::none();
+        (known.closest, known.distance, known.inside) = (Some(nothing), depth.abs(), depth > 0.0);
+        return nothing;
+    }
     let closest = surface.closest(x, known.last);
     known.closest = Some(closest);
     known.distance = closest.distance_squared.sqrt();
@@ -353,6 +367,7 @@ mod tests {
                 tolerance: 1e-8,
                 max_iterations: 1,
                 surface,
+                round: None,
             };
             let model = Model::new(&object, &chain, contact);
             let mut detection = Detection::new(&model);

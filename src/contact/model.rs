@@ -1,10 +1,12 @@
 //! The data of object and proxy that contact needs, computed once and shared by all threads.
 
 use super::geometry::{RestSurface, smooth::SmoothSurface};
+use super::law::rounded::Rounded;
+use super::linear::condensed::Condensed;
 use crate::contact::geometry::LENGTH_ROUNDING;
 use crate::object::{Compliance, Object};
 use crate::proxy::Chain;
-use crate::scene::ContactSpec;
+use crate::scene::{ContactLaw, ContactSpec};
 use std::sync::Arc;
 
 /// Stiffness of a rigid contact point, in units of the stiffness of the object's softest node (one over the trace of
@@ -35,6 +37,11 @@ pub struct Model<'a> {
     pub with_slip: bool,
     /// The surface at rest.
     pub surface: Arc<RestSurface<'a>>,
+    /// The same rounded, where contact is with that.
+    pub(crate) rounded: Option<Arc<Rounded>>,
+    /// The compliance on the points of its lattice, and those on which it is asked for.
+    pub(crate) condensed: Arc<Condensed>,
+    wanted: Arc<Vec<bool>>,
     /// Largest trace of a covered node's own block C_jj: no node moves farther than sqrt(max_nodal_compliance) times
     /// |u| in the energy norm (m/N).
     pub max_nodal_compliance: f64,
@@ -60,7 +67,9 @@ impl<'a> Model<'a> {
     /// Prepares `object` and `chain` for contact as `contact` says, wherever it may be.
     #[must_use]
     pub fn new(object: &'a Object, chain: &'a Chain, contact: ContactSpec) -> Self {
-        Self::with_compliance(object, chain, contact, Compliance::new(object).into())
+        let mut model = Self::with_compliance(object, chain, contact, Compliance::new(object).into());
+        model.want_all();
+        model
     }
 
     /// Surface nodes up to which all of the compliance is formed: at most 0.3 GB, in some seconds.
@@ -72,9 +81,13 @@ impl<'a> Model<'a> {
         contact: ContactSpec,
         compliance: Arc<Compliance>,
     ) -> Self {
+        let surface = Arc::new(RestSurface::new(object, contact.surface));
         let mut model = Self {
             object,
             chain,
+            rounded: rounded(&surface, chain, contact),
+            condensed: Arc::default(),
+            wanted: Arc::default(),
             max_nodal_compliance: 0.0,
             mobility: 0.0,
             bulge_mobility: 0.0,
@@ -85,7 +98,7 @@ impl<'a> Model<'a> {
             shares: chain.nodes.iter().map(|node| contact.share(node.length)).collect(),
             with_tangent: false,
             with_slip: false,
-            surface: Arc::new(RestSurface::new(object, contact.surface)),
+            surface,
         };
         model.measure_compliance();
         model
@@ -95,6 +108,27 @@ impl<'a> Model<'a> {
     pub fn take_compliance(&mut self, compliance: Arc<Compliance>) {
         self.compliance = compliance;
         self.measure_compliance();
+        self.condense();
+    }
+
+    /// Condenses the compliance on all points of a rounded surface that may be touched.
+    pub(super) fn want_all(&mut self) {
+        if let Some(rounded) = &self.rounded {
+            self.want(rounded.near(greatest_radius(self.chain)));
+        }
+    }
+
+    /// Condenses the compliance on the points of a rounded surface that are `wanted`.
+    pub(super) fn want(&mut self, wanted: Vec<bool>) {
+        self.wanted = Arc::new(wanted);
+        self.condense();
+    }
+
+    fn condense(&mut self) {
+        if let Some(rounded) = self.rounded.as_ref().filter(|_| !self.wanted.is_empty()) {
+            self.condensed =
+                Arc::new(Condensed::new(&rounded.rows, |l| rounded.sources(l), &self.wanted, &self.compliance));
+        }
     }
 
     /// Takes from the compliance how far the surface moves, and how stiff rigid contact is.
@@ -113,6 +147,11 @@ impl<'a> Model<'a> {
         let mut model = Self { contact, shares, ..self.clone() };
         if contact.surface != self.contact.surface {
             model.surface = Arc::new(RestSurface::new(self.object, contact.surface));
+        }
+        if (contact.surface, contact.law, contact.round) != (self.contact.surface, self.contact.law, self.contact.round)
+        {
+            model.rounded = rounded(&model.surface, self.chain, contact);
+            model.want_all();
         }
         model.measure_compliance();
         model
@@ -133,6 +172,17 @@ impl<'a> Model<'a> {
         let bulging = self.bulge_mobility.sqrt() * norm;
         MotionBound { moved: self.mobility.sqrt() * norm + bulging, bulge: self.surface.bulge + bulging }
     }
+}
+
+/// `surface` rounded for `chain` as `contact` says, if it says so.
+fn rounded(surface: &RestSurface<'_>, chain: &Chain, contact: ContactSpec) -> Option<Arc<Rounded>> {
+    let spacing = contact.round.filter(|_| contact.law == ContactLaw::Rest)?;
+    Some(Arc::new(Rounded::new(surface, spacing, greatest_radius(chain))))
+}
+
+/// The greatest radius of a node of `chain` (m).
+pub(super) fn greatest_radius(chain: &Chain) -> f64 {
+    chain.nodes.iter().map(|node| node.radius).fold(0.0, f64::max)
 }
 
 /// The greatest g . C g over what facets stand off their flat triangles by, as a sum g of nodes' displacements: a bound

@@ -8,12 +8,14 @@
 
 use super::Proximity;
 use super::detection::Detection;
-use super::model::Model;
-use crate::Error;
-use crate::JointVector;
+use super::geometry::RestSurface;
+use super::law::rounded::Rounded;
+use super::model::{Model, greatest_radius};
+use super::thin_parts;
 use crate::object::{Compliance, Object};
 use crate::proxy::Chain;
-use crate::scene::ContactSpec;
+use crate::scene::{ContactLaw, ContactSpec};
+use crate::{Error, JointVector, error, memory};
 use rayon::prelude::*;
 
 /// How far the surface of an object is expected to move, in depths of the deepest proxy node below it at rest (1): in
@@ -21,10 +23,22 @@ use rayon::prelude::*;
 /// drag along.
 const EXPECTED_MOTION: f64 = 2.0;
 
+/// Least thickness of a part of a rounded object, over the length (1): the lattice blends sides over two lengths each,
+/// and a part of two or less has no depth left.
+const THICKNESS: f64 = 6.0;
+
+/// Memory of a point of the lattice (bytes): a row of the surface at rest and a corrected one, which hang on a facet's
+/// nodes and on those of seven facets, most of them shared.
+const POINT_BYTES: usize = 2048;
+
 /// Configurations that one thread takes at a time.
 const SHARE: usize = 256;
 
 impl<'a> Model<'a> {
+    /// Points of a rounded surface's lattice up to which the compliance on all is formed: as much memory and time as
+    /// [`Model::WHOLE`] surface nodes take.
+    const WHOLE_POINTS: usize = 3 * Self::WHOLE;
+
     /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes,
     /// only the compliance of those within the proxy's reach is formed, and none where there is no configuration. One
     /// that reaches farther is flagged [`super::Status::Overflow`].
@@ -37,45 +51,68 @@ impl<'a> Model<'a> {
         contact: ContactSpec,
         configurations: &[JointVector],
     ) -> Result<Self, Error> {
-        if object.surface_nodes <= Self::WHOLE && !configurations.is_empty() {
-            let whole = Compliance::on(object, (0..object.surface_nodes as u32).collect())?;
-            return Ok(Self::with_compliance(object, chain, contact, whole));
+        if contact.round.is_some() {
+            check_rounding(&RestSurface::new(object, contact.surface), chain, contact)?;
         }
-        let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
-        let nodes = reached(&model, configurations);
-        model.take_compliance(Compliance::on(object, nodes)?);
+        let is_whole = object.surface_nodes <= Self::WHOLE && !configurations.is_empty();
+        let nodes = if is_whole { (0..object.surface_nodes as u32).collect() } else { Vec::new() };
+        let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, nodes)?);
+        if let Some(rounded) = model.rounded.clone() {
+            let mut points = rounded.near(greatest_radius(chain));
+            if configurations.is_empty() || count(&points) > Self::WHOLE_POINTS {
+                points = reached(&model, configurations);
+                check_points(count(&points))?;
+            }
+            if !is_whole {
+                model.take_compliance(Compliance::on(object, rounded.nodes(&points))?);
+            }
+            model.want(points);
+        } else if !is_whole {
+            let nodes = nodes_of_leaves(&model, &reached(&model, configurations));
+            model.take_compliance(Compliance::on(object, nodes)?);
+        }
         Ok(model)
     }
 }
 
-/// Surface nodes of `model` that the proxy reaches in `configurations`, ascending.
-fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<u32> {
-    let marked = configurations
+/// What of `model` the proxy reaches in `configurations`: points of a rounded surface, or leaves of the surface's tree.
+fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<bool> {
+    let count = model.rounded.as_ref().map_or(model.surface.bounds.leaves.len(), |rounded| rounded.count());
+    configurations
         .par_chunks(SHARE)
         .map_init(
             || Proximity::new(model),
             |proximity, share| {
-                let mut marked = vec![false; model.surface.bounds.leaves.len()];
+                let mut marked = vec![false; count];
                 share.iter().for_each(|q| mark(model, proximity, q, &mut marked));
                 marked
             },
         )
         .reduce(
-            || vec![false; model.surface.bounds.leaves.len()],
+            || vec![false; count],
             |mut all, some| {
                 all.iter_mut().zip(some).for_each(|(all, some)| *all |= some);
                 all
             },
-        );
+        )
+}
+
+/// How many are true.
+fn count(marked: &[bool]) -> usize {
+    marked.iter().filter(|marked| **marked).count()
+}
+
+/// Surface nodes on which the leaves `marked` hang, ascending.
+fn nodes_of_leaves(model: &Model<'_>, marked: &[bool]) -> Vec<u32> {
     let mut reached = vec![false; model.surface.positions.len()];
-    for (leaf, _) in model.surface.bounds.leaves.iter().zip(marked).filter(|(_, marked)| *marked) {
+    for (leaf, _) in model.surface.bounds.leaves.iter().zip(marked).filter(|(_, marked)| **marked) {
         let carriers = leaf.triangles.iter().flat_map(|&t| model.surface.carriers(t).0);
         carriers.for_each(|&node| reached[node as usize] = true);
     }
     (0..).zip(reached).filter(|(_, reached)| *reached).map(|(node, _)| node).collect()
 }
 
-/// Marks the leaves of the surface's tree that matter at `q`.
+/// Marks the points, or the leaves of the surface's tree, that matter at `q`.
 fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marked: &mut [bool]) {
     let gap = proximity.gap(q);
     if gap >= 0.0 {
@@ -87,13 +124,57 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
             continue;
         }
         let radius = (clearance + node.radius).abs() + 2.0 * motion;
-        let (x, radius) = (*x - model.surface.centre, radius + model.surface.bulge);
+        let x = *x - model.surface.centre;
+        if let Some(rounded) = &model.rounded {
+            rounded.mark(x, 2.0 * motion, marked);
+            continue;
+        }
+        let radius = radius + model.surface.bulge;
         let squared = radius * radius + model.surface.bounds.slack(x);
         model.surface.bounds.walk(x, squared, |leaf| {
             marked[leaf] = true;
             squared
         });
     }
+}
+
+/// Checks that `surface` can be rounded for `chain` as `contact` says.
+///
+/// # Errors
+/// When a part of it is too thin, or the lattice would not fit in memory.
+fn check_rounding(surface: &RestSurface<'_>, chain: &Chain, contact: ContactSpec) -> Result<(), Error> {
+    let Some(length) = contact.round.filter(|_| contact.law == ContactLaw::Rest) else { return Ok(()) };
+    let millimetres = |length: f64| 1e3 * length;
+    let thickness = thin_parts::least_thickness(surface);
+    if thickness < THICKNESS * length {
+        return Err(error!(
+            "the object has a part {:.1} mm thick, and contact is rounded over {:.1} mm: both sides would blend into one, \
+             and the part vanish. Take round up to {:.1} mm, a {THICKNESS:.0}th of the thickness, or leave it out of \
+             [contact]",
+            millimetres(thickness),
+            millimetres(length),
+            millimetres(thickness) / THICKNESS,
+        ));
+    }
+    let points = Rounded::points(surface, length, greatest_radius(chain));
+    let points = points.into_iter().fold(1, usize::saturating_mul);
+    check_memory(points, points.saturating_mul(POINT_BYTES))
+}
+
+/// Checks that the compliance on `points` of the lattice would fit in memory.
+fn check_points(points: usize) -> Result<(), Error> {
+    // What it is made of takes as much for the time being.
+    check_memory(points, points.saturating_mul(points).saturating_mul(2 * size_of::<f64>()))
+}
+
+/// Checks that `bytes` for `points` of the lattice would fit in memory.
+fn check_memory(points: usize, bytes: usize) -> Result<(), Error> {
+    memory::check(bytes).map_err(|shortage| {
+        error!(
+            "the lattice that rounds contact has {points} points, and does not fit in memory: {shortage}; round over a \
+             greater length, or shorten the ranges of the joints"
+        )
+    })
 }
 
 /// Whether the compliance covers all that a result depends on whose forces are on the object's nodes `loaded` and on the
@@ -105,6 +186,10 @@ pub(crate) fn covers(
     touching: impl Iterator<Item = usize>,
     moved: f64,
 ) -> bool {
+    if let Some(rounded) = &model.rounded {
+        let mut points = touching.filter_map(|i| rounded.blend(detection.nodes()[i]));
+        return points.all(|blend| rounded.values(&blend).all(|(l, _)| model.condensed.place(l).is_some()));
+    }
     if model.compliance.is_whole() {
         return true;
     }

@@ -144,7 +144,7 @@ impl<'a> Solver<'a> {
             HeldBy::Rest => Some(self.rest.elastic),
             HeldBy::Nothing => None,
         };
-        model.compliance.is_whole()
+        (model.compliance.is_whole() && model.rounded.is_none())
             || elastic.is_some_and(|elastic| self.covers_within(equilibrium, model.motion_bound(elastic).moved))
             || {
                 let moved = self.displacement().chunks_exact(3).map(|u| DVec3::from_slice(u).length());
@@ -188,8 +188,9 @@ impl<'a> Solver<'a> {
 
     /// How the torque of the last configuration solved depends on the object, where it touches and its surface is at rest.
     #[must_use]
-    pub fn sensitivity(&self) -> Option<Sensitivity> {
-        (self.held_by == HeldBy::Rest).then(|| self.rest.sensitivity(self.model, &self.pose))
+    pub fn sensitivity(&mut self) -> Option<Sensitivity> {
+        let Self { model, pose, rest, held_by, .. } = self;
+        (*held_by == HeldBy::Rest).then(|| rest.sensitivity(model, pose))
     }
 
     /// The proxy's pose at the last configuration solved.
@@ -235,10 +236,14 @@ impl<'a> Solver<'a> {
         let outcome = rest.solve(model, detection, Guess::Depths).unwrap_or_default();
         self.held_by = HeldBy::Rest;
         equilibrium.energy = rest.energy;
+        for (&node, &force) in rest.support.nodes().iter().zip(rest.forces.as_chunks().0) {
+            if force != [0.0; 3] {
+                reactions.push(node, DVec3::from_array(force));
+            }
+        }
         for (i, row) in rest.rows.iter().enumerate().filter(|(_, row)| row.multiplier > 0.0) {
-            let carriers: Vec<(u32, f64)> = row.carriers.iter().collect();
-            reactions.push_back(&carriers, row.normal * row.multiplier);
-            equilibrium.touches.push(Touch { proxy_node: row.proxy_node, carriers, force: rest.force(i) });
+            let (carriers, force) = (rest.carriers(i), rest.force(i));
+            equilibrium.touches.push(Touch { proxy_node: row.proxy_node, carriers, force });
         }
         equilibrium.touches.sort_unstable_by_key(|touch| touch.proxy_node);
         outcome

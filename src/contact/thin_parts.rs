@@ -3,13 +3,17 @@
 //! Contact is with the closest surface. A contact node that gets past the middle of a part is therefore pushed out on
 //! the far side, and one that leaves the part there is free: the torque changes its sign at the middle and ends beyond.
 
-use super::{Model, Proximity};
+use super::Proximity;
+use super::geometry::RestSurface;
 use crate::JointVector;
 use glam::DVec3;
 
 /// How near a contact node comes to the middle when it gets there, over the thickness (1): coordinates that are a
 /// thousand times as large as a thickness are rounded by some 1e-12 of it, and a grid point may lie on the middle.
 const ROUNDING: f64 = 1e-9;
+
+/// Triangles below which the thickness of a surface is measured (1): a part of one in a thousand of them may be missed.
+const LOOKED_AT: usize = 1000;
 
 /// A contact node that gets to the middle of a part of the object, or past it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,10 +39,14 @@ impl Proximity<'_> {
         for node in inside {
             let x = self.pose().nodes[node] - surface.centre;
             let closest = surface.closest(x, u32::MAX);
+            // A rounded surface may be as far outside.
+            if !surface.is_inside(x, &closest) {
+                continue;
+            }
             let foot = surface.facet_at_rest(closest.triangle).point(closest.point.weights);
             let inwards = (x - foot).normalize_or_zero();
             // Everything around the node that is nearer than the surface lies within the object.
-            if let Some(beyond) = way_out(model, x, inwards) {
+            if let Some(beyond) = way_out(surface, x, inwards) {
                 parts.push((PastMiddle { node, thickness: x.distance(foot) + beyond }, foot, inwards));
             }
         }
@@ -61,10 +69,19 @@ impl Proximity<'_> {
     }
 }
 
+/// Least thickness of `surface` below the middles of its triangles, [`LOOKED_AT`] of them (m).
+pub(super) fn least_thickness(surface: &RestSurface<'_>) -> f64 {
+    let count = surface.triangles.len();
+    let below = |t: usize| {
+        let middle = surface.triangles[t].iter().map(|&node| surface.positions[node as usize]).sum::<DVec3>() / 3.0;
+        way_out(surface, middle, -surface.normals[t])
+    };
+    (0..count).step_by(count.div_ceil(LOOKED_AT).max(1)).filter_map(below).fold(f64::INFINITY, f64::min)
+}
+
 /// Distance from `x` inside the object to its flat triangles in `direction`; none where the direction is zero, or where
 /// rounding lets the line pass between triangles (m).
-fn way_out(model: &Model<'_>, x: DVec3, direction: DVec3) -> Option<f64> {
-    let surface = &model.surface;
+fn way_out(surface: &RestSurface<'_>, x: DVec3, direction: DVec3) -> Option<f64> {
     let corners = |triangle: &[u32; 3]| triangle.map(|node| surface.positions[node as usize] - x);
     let distance = |triangle: &[u32; 3]| {
         let [a, b, c] = corners(triangle);

@@ -77,13 +77,12 @@ fn decode(path: &Path, map: Mmap) -> Result<Dataset, Error> {
     }
     let (grid, provenance) = container.heading().map_err(damaged)?;
     let scene = container.text("scene").map_err(damaged)?.to_string();
-    let Container { windows, tensors, .. } = &mut container;
-    if tensors.contains_key(TOUCHES) {
+    if container.tensors.contains_key(TOUCHES) {
         let what = "holds contact forces on the arm's nodes, by which an earlier version felt friction and contact \
                     damping; leave contact_damping out of its scene and bake it again";
         return Err(Error::at(path, what).of(ErrorKind::Dataset));
     }
-    let mut arrays = Arrays { windows, tensors, grid: &grid };
+    let mut arrays = Arrays { file: &mut container, grid: &grid };
     let dataset = Dataset { scene, provenance, ..Dataset::of(&mut arrays, grid.clone()).map_err(damaged)? };
     container.finish().map_err(damaged)?;
     check::check(&dataset).map_err(damaged)?;
@@ -95,7 +94,9 @@ pub(crate) struct Container {
     texts: HashMap<String, String>,
     /// Those that have not been taken.
     tensors: BTreeMap<String, TensorInfo>,
-    windows: Windows,
+    map: Arc<Mmap>,
+    /// Where the tensors begin.
+    start: usize,
 }
 
 impl Container {
@@ -134,7 +135,8 @@ impl Container {
         let container = Self {
             texts: metadata.metadata().clone().unwrap_or_default(),
             tensors: metadata.tensors().into_iter().map(|(name, info)| (name, info.clone())).collect(),
-            windows: Windows { map: Arc::new(map), start },
+            map: Arc::new(map),
+            start,
         };
         let found = container.text("format").map_err(damaged)?;
         if ![FORMAT, store::file::FORMAT].contains(&found) {
@@ -169,37 +171,7 @@ impl Container {
         name: &str,
         shape: &[Option<usize>],
     ) -> Result<Option<Column<T>>, String> {
-        self.windows.column(&mut self.tensors, name, shape)
-    }
-
-    /// Takes the object's geometry; `None` where it is absent. `Err` says what is wrong.
-    pub(super) fn surface(&mut self, grid: &Grid) -> Result<Option<Surface>, String> {
-        Surface::of_arrays(&mut Arrays { windows: &self.windows, tensors: &mut self.tensors, grid })
-    }
-
-    /// `Err` names a tensor that has not been taken.
-    pub(crate) fn finish(&self) -> Result<(), String> {
-        let extra = self.tensors.first_key_value();
-        extra.map_or(Ok(()), |(name, _)| Err(format!("tensor {name} does not belong here")))
-    }
-}
-
-/// Cuts a mapped file into columns.
-struct Windows {
-    map: Arc<Mmap>,
-    /// Where the tensors begin.
-    start: usize,
-}
-
-impl Windows {
-    /// Takes the tensor `name` out of `tensors`; `None` where it is absent. `shape` leaves free lengths as `None`.
-    fn column<T: Element>(
-        &self,
-        tensors: &mut BTreeMap<String, TensorInfo>,
-        name: &str,
-        shape: &[Option<usize>],
-    ) -> Result<Option<Column<T>>, String> {
-        let Some(info) = tensors.remove(name) else { return Ok(None) };
+        let Some(info) = self.tensors.remove(name) else { return Ok(None) };
         let fits = info.shape.len() == shape.len()
             && info.shape.iter().zip(shape).all(|(found, expected)| expected.is_none_or(|expected| expected == *found));
         if info.dtype != T::DTYPE || !fits {
@@ -210,17 +182,27 @@ impl Windows {
             .map(Some)
             .ok_or_else(|| format!("tensor {name} lies outside the file or is misaligned"))
     }
+
+    /// Takes the object's geometry; `None` where it is absent. `Err` says what is wrong.
+    pub(super) fn surface(&mut self, grid: &Grid) -> Result<Option<Surface>, String> {
+        Surface::of_arrays(&mut Arrays { file: self, grid })
+    }
+
+    /// `Err` names a tensor that has not been taken.
+    pub(crate) fn finish(&self) -> Result<(), String> {
+        let extra = self.tensors.first_key_value();
+        extra.map_or(Ok(()), |(name, _)| Err(format!("tensor {name} does not belong here")))
+    }
 }
 
 /// The arrays of a file of a dataset over a grid, of which each is taken once.
 struct Arrays<'a> {
-    windows: &'a Windows,
-    tensors: &'a mut BTreeMap<String, TensorInfo>,
+    file: &'a mut Container,
     grid: &'a Grid,
 }
 
 impl Source for Arrays<'_> {
     fn take<T: Element>(&mut self, array: Stored) -> Result<Option<Column<T>>, String> {
-        self.windows.column(self.tensors, array.name(), &array.shape(self.grid))
+        self.file.optional(array.name(), &array.shape(self.grid))
     }
 }

@@ -86,16 +86,6 @@ impl StatusCounts {
         } += 1;
     }
 
-    /// Counts the points of `other`, too.
-    pub fn merge(&mut self, other: Self) {
-        let Self { free, contact, unconverged, overflow, outside } = other;
-        self.free += free;
-        self.contact += contact;
-        self.unconverged += unconverged;
-        self.overflow += overflow;
-        self.outside += outside;
-    }
-
     /// Points at which something touches, converged or not.
     #[must_use]
     pub fn in_contact(&self) -> usize {

@@ -63,6 +63,9 @@ pub enum GpuError {
     /// The kernel takes arms of as many joints as a grid has axes.
     #[error("the GPU solves for arms of at most {MAX_AXES} joints, not {0}. Use --backend cpu")]
     Joints(usize),
+    /// The kernel takes the surface at rest as it is.
+    #[error("the GPU solves contact with a surface that is not rounded. Use --backend cpu, or leave `round` out")]
+    Rounded,
     /// The kernel takes contact with the surface at rest alone.
     #[error(
         "the GPU solves contact with the surface at rest, not by the law `{0}`. Name `law = \"rest\"` in the \

@@ -62,6 +62,9 @@ impl RestModel {
         if model.contact.law != ContactLaw::Rest {
             return Err(GpuError::Law(model.contact.law.name()));
         }
+        if model.contact.round.is_some() {
+            return Err(GpuError::Rounded);
+        }
         let joints = model.chain.joints.len();
         if joints > MAX_AXES {
             return Err(GpuError::Joints(joints));

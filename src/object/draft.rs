@@ -7,7 +7,7 @@ use super::{
 };
 use crate::Error;
 use crate::scene::Placement;
-use crate::toml_text::{coarse, entry, number, quoted, vector};
+use crate::toml_text::{coarse, entry, number, quoted, significant, vector};
 use glam::DVec3;
 use std::fmt::{self, Write};
 use std::path::Path;
@@ -150,7 +150,7 @@ impl BodyFacts<'_> {
         }
         entry(text, "centre", &vector(-self.middle, 6), "m, where the file's origin lies")?;
         writeln!(text, "\n[object.elasticity]")?;
-        entry(text, "young", &format!("{:?}", self.young), "Pa")?;
+        entry(text, "young", &significant(self.young), "Pa")?;
         entry(text, "poisson", &number(POISSON, 3), "")?;
         writeln!(text, "\n[object.skin]")?;
         let meaning = "m, over which the dent of a point is rounded";

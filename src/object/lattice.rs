@@ -3,7 +3,8 @@
 //! Cubes cover the surface, each an element of 27 nodes. One that the surface cuts is integrated over what lies inside,
 //! and over the rest with a small factor (finite cells: Parvizian, Düster & Rank 2007). They are smallest where the
 //! edges of the surface are shortest, for contact is awaited there; twice, four times, ... as large where the edges are
-//! so much longer, and as far inside as they are large, for strain fades with depth. A node on the face of a larger cube
+//! so much longer, and as far inside as they are large, for strain fades with depth. Those that an inclusion cuts are
+//! halved until they are small beside it. A node on the face of a larger cube
 //! that is none of its nodes hangs on them, by their shape functions, so displacement is continuous.
 //!
 //! Walls thinner than half a cube have lines in them, but bend as polynomials of a whole cube do.
@@ -49,15 +50,17 @@ struct Cube {
 }
 
 impl Lattice {
-    /// Fills the closed surface with `finest` cubes and larger ones. `points`: on all of the surface, so that each has a
-    /// cube. Cubes that a sphere of `materials` cuts are of the smallest.
+    /// Fills the closed surface with cubes of `level` and larger ones, and smaller ones where a sphere of `materials` cuts
+    /// them. `points`: on all of the surface, so that each has a cube.
     pub fn fill(
-        finest: Level,
+        level: Level,
         (nodes, triangles): (&[DVec3], &[[u32; 3]]),
         points: &[SurfacePoint],
         spacing: &Spacing,
         materials: &Materials<'_>,
     ) -> Self {
+        let halvings = level.halvings(materials.largest_cut());
+        let finest = level.finer(halvings);
         let coarsest = finest.counts.min_element().ilog2();
         // As many as whole ones of the largest size hold.
         let finest = Level { counts: (finest.counts + (1 << coarsest) - 1) >> coarsest << coarsest, ..finest };
@@ -70,19 +73,16 @@ impl Lattice {
             for point in points {
                 let cube = level.number(finest.place(point) >> number as u32);
                 facing[cube] += point.area * point.normal.abs();
-                is_fine[cube] |= spacing.level(point.owner) < number;
+                is_fine[cube] |= spacing.level(point.owner) + halvings < number;
             }
             let filled = level.fill(nodes, triangles, &facing);
-            for cube in (0..is_fine.len()).filter(|_| number > 0) {
-                is_fine[cube] |= materials.is_cut(level.corners(level.cube_at(cube)));
-            }
             for (cube, filling) in filled.into_iter().enumerate() {
                 let at = level.cube_at(cube);
                 let [low, high] = [(at - 1).max(IVec3::ZERO), (at + 2).min(level.counts)];
                 let is_covered = lattice.numbers[finest.number(at << number as u32)] != ABSENT;
-                if let Some(filling) =
-                    filling.filter(|_| !is_covered && !within(low, high).any(|at| is_fine[level.number(at)]))
-                {
+                let is_halved = number > 0 && materials.cut(level.corners(at)).is_some_and(|size| level.size > size)
+                    || within(low, high).any(|at| is_fine[level.number(at)]);
+                if let Some(filling) = filling.filter(|_| !is_covered && !is_halved) {
                     for covered in within(at << number as u32, (at + 1) << number as u32) {
                         lattice.numbers[finest.number(covered)] = lattice.cubes.len() as u32;
                     }
@@ -233,7 +233,7 @@ impl Elements for Lattice {
         let mut quadrature = Quadrature::default();
         let mut lame = Vec::new();
         let factor = if cube.filling.inside.is_some() { 1.0 - OUTSIDE } else { 1.0 };
-        if materials.is_cut([low, low + size]) {
+        if materials.cut([low, low + size]).is_some() {
             // Points and materials in each eighth.
             let eighth = |k: usize| low + 0.5 * size * DVec3::from_array([k / 4, k / 2 % 2, k % 2].map(|i| i as f64));
             let means: Vec<Option<Lame>> =
@@ -264,7 +264,7 @@ impl Elements for Lattice {
     fn kind(&self, element: usize, materials: &Materials<'_>) -> Option<usize> {
         let cube = &self.cubes[element];
         let corners = self.level(cube).corners(cube.at);
-        let alike = cube.filling.inside.is_none() && cube.carriers.is_none() && !materials.is_cut(corners);
+        let alike = cube.filling.inside.is_none() && cube.carriers.is_none() && materials.cut(corners).is_none();
         let [low, high] = corners;
         alike.then(|| materials.number(low.midpoint(high), None) * self.levels.len() + cube.level)
     }

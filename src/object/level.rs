@@ -76,6 +76,17 @@ impl Level {
         Self { size: f64::from(factor) * self.size, counts, ..self }
     }
 
+    /// How often these must be halved to be no larger than `size` (m), as far as they can be counted then.
+    pub fn halvings(&self, size: f64) -> usize {
+        let countable = (MAX_CUBES / self.counts.as_dvec3().element_product()).log2() / 3.0;
+        ((self.size / size).log2() - GRID_LINE).ceil().min(countable.floor()) as usize
+    }
+
+    /// Cubes that are halved `halvings` times, over the same box.
+    pub fn finer(self, halvings: usize) -> Self {
+        Self { size: self.size / f64::from(1 << halvings), counts: self.counts << halvings as u32, ..self }
+    }
+
     pub fn number(&self, at: IVec3) -> usize {
         ((at.x * self.counts.y + at.y) * self.counts.z + at.z) as usize
     }

@@ -51,17 +51,21 @@ impl Mechanics {
         let shell = &object.rest[..object.surface_nodes];
         let edge = mean_edge(shell, &object.triangles);
         let mut points = Vec::new();
-        let elements: Option<Box<dyn Elements>> = match &spec.material {
-            Material::Elastic(elastic) if object.tetrahedra.is_empty() => {
+        let elastic = match &spec.material {
+            Material::Elastic(elastic) => Some((elastic, Materials::new(elastic, shell))),
+            _ => None,
+        };
+        let elements: Option<Box<dyn Elements>> = match &elastic {
+            Some((elastic, materials)) if object.tetrahedra.is_empty() => {
                 let spacing = Spacing::new(shell, &object.triangles);
                 let cell = elastic.cell.unwrap_or_else(|| spacing.suitable_size(shell));
-                let finest = Level::around(shell, cell)?;
+                let level = Level::around(shell, cell)?;
                 points = attachment::surface_points(shell, &object.triangles, lattice::POINT_SPACING * cell);
                 let surface = (shell, &object.triangles[..]);
-                Some(Box::new(Lattice::fill(finest, surface, &points, &spacing, &Materials::new(elastic))))
+                Some(Box::new(Lattice::fill(level, surface, &points, &spacing, materials)))
             }
-            Material::Elastic(_) => Some(Box::new(Tetrahedra::new(object))),
-            _ => None,
+            Some(_) => Some(Box::new(Tetrahedra::new(object))),
+            None => None,
         };
         let elements = elements.as_deref();
         if points.is_empty() {
@@ -98,17 +102,13 @@ impl Mechanics {
         drop(cliques);
         stiffness.ordering = ordering::nested_dissection(&stiffness, &moved);
         let mut share = vec![1.0 / moved.len() as f64; moved.len()];
-        match (&spec.material, elements) {
-            (Material::Springs(springs), _) => springs::add(spec, *springs, &moved, &edges, &mut stiffness)?,
-            (Material::Elastic(elastic), Some(elements)) => {
-                share = solid::add(elements, &Materials::new(elastic), &mut stiffness)?;
-            }
-            _ => {}
+        if let Material::Springs(springs) = &spec.material {
+            springs::add(spec, *springs, &moved, &edges, &mut stiffness)?;
         }
-        let young = match &spec.material {
-            Material::Elastic(elastic) => elastic.young,
-            _ => 0.0,
-        };
+        if let (Some((_, materials)), Some(elements)) = (&elastic, elements) {
+            share = solid::add(elements, materials, &mut stiffness)?;
+        }
+        let young = elastic.map_or(0.0, |(elastic, _)| elastic.young);
         let held =
             Held { points: &points, attachment: &attachment, solid: elements.map(|elements| (elements, young)), edge };
         for (ground, grounded) in spec.ground.iter().zip(&grounded) {

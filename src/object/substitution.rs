@@ -257,12 +257,8 @@ impl Supernode<'_> {
             let (diagonal, rest) = column.split_at(width);
             let solved = own[c] * diagonal[c].recip();
             own[c] = solved;
-            for (entry, &l) in own[c + 1..].iter_mut().zip(&diagonal[c + 1..]) {
-                *entry -= solved * l;
-            }
-            for (entry, &l) in below.iter_mut().zip(rest) {
-                *entry += solved * l;
-            }
+            add(solved * -1.0, &diagonal[c + 1..], &mut own[c + 1..]);
+            add(solved, rest, below);
         }
     }
 
@@ -280,18 +276,33 @@ impl Supernode<'_> {
     }
 }
 
-/// Sums that run side by side, so that none waits for the one before.
+/// Sums that run side by side, so that none waits for the one before. The loops over them are written out: builds for
+/// tests, which optimise little, would take ten times as long.
 const SUMS: usize = 4;
+
+/// Adds `factor` times `weights` to `entries`, which are as many.
+fn add<T: Entry>(factor: T, weights: &[f64], entries: &mut [T]) {
+    let (weights, last_weights) = weights.as_chunks::<SUMS>();
+    let (entries, last_entries) = entries.as_chunks_mut::<SUMS>();
+    for (entries, weights) in entries.iter_mut().zip(weights) {
+        entries[0] += factor * weights[0];
+        entries[1] += factor * weights[1];
+        entries[2] += factor * weights[2];
+        entries[3] += factor * weights[3];
+    }
+    last_entries.iter_mut().zip(last_weights).for_each(|(entry, &weight)| *entry += factor * weight);
+}
 
 /// Sum of `weights` times `entries`, which are as many.
 fn dot<T: Entry>(weights: &[f64], entries: &[T]) -> T {
     let mut sums = [T::default(); SUMS];
     let (weights, last_weights) = weights.as_chunks::<SUMS>();
     let (entries, last_entries) = entries.as_chunks::<SUMS>();
-    for (weights, entries) in weights.iter().zip(entries) {
-        for ((sum, &weight), &entry) in sums.iter_mut().zip(weights).zip(entries) {
-            *sum += entry * weight;
-        }
+    for (entries, weights) in entries.iter().zip(weights) {
+        sums[0] += entries[0] * weights[0];
+        sums[1] += entries[1] * weights[1];
+        sums[2] += entries[2] * weights[2];
+        sums[3] += entries[3] * weights[3];
     }
     let [mut total, others @ ..] = sums;
     others.into_iter().for_each(|sum| total += sum);

@@ -163,7 +163,7 @@ impl Elements for Tetrahedra {
         let places = corners.map(|corner| self.nodes[corner as usize]);
         let [low, high] = [DVec3::min, DVec3::max].map(|pick| places.into_iter().reduce(pick).unwrap_or_default());
         // What a sphere cuts needs more points, as what is curved does.
-        let is_cut = materials.is_cut([low, high]);
+        let is_cut = materials.cut([low, high]).is_some();
         for (at, weight) in points(self.is_curved || is_cut) {
             let is_proper = self.push(&mut quadrature, element, at, weight);
             if !is_proper {

@@ -149,7 +149,7 @@ pub fn haptize(bake: Bake<'_>) -> Result<(Dataset, SweepReport), Error> {
     sweep.diagnose(&model);
     sweep.skip_free_space(&model)?;
     sweep.measure_error(&model, &scene.haptics, measured)?;
-    let Ok(()) = sweep.predict(&mut backend, true);
+    let Ok(_) = sweep.predict(&mut backend, true);
     let (mut dataset, report) = sweep.run(&mut backend, Run { chunk: CHUNK, stop, progress })?;
     dataset.provenance.algorithm = NAME.into();
     Ok((dataset, report))

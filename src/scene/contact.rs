@@ -38,6 +38,8 @@ pub struct ContactSpec {
     pub max_iterations: u32,
     /// Which surface the proxy feels.
     pub surface: ContactSurface,
+    /// Length over which the law at rest rounds that surface; none leaves its edges sharp (m).
+    pub round: Option<f64>,
 }
 
 /// `[contact]` as it is written.
@@ -57,6 +59,8 @@ pub(super) struct ContactTable {
     max_iterations: u32,
     #[serde(default)]
     surface: ContactSurface,
+    #[serde(default, deserialize_with = "positive")]
+    round: Option<f64>,
     /// Of a law that was removed.
     updates: Option<IgnoredAny>,
 }
@@ -82,6 +86,12 @@ impl ContactSpec {
             Some(per_length) if length > 0.0 => per_length * length / 3.0,
             _ => self.stiffness,
         }
+    }
+
+    /// The same contact by `law`. Only contact at rest is rounded.
+    #[must_use]
+    pub fn by(self, law: ContactLaw) -> Self {
+        Self { law, round: self.round.filter(|_| law == ContactLaw::Rest), ..self }
     }
 
     /// The same over [`ContactSpec::stiffness`] (1).
@@ -164,7 +174,7 @@ impl ContactTable {
             let key = LAW_KEYS.into_iter().find(|key| checker.has(&format!("contact.{key}")));
             checker.at(&format!("contact.{}", key.unwrap_or("law")), remedy)
         })?;
-        let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, surface, .. } = self;
+        let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, surface, round, .. } = self;
         match (stiffness > 0.0, stiffness_per_length) {
             (true, None) => {}
             (true, Some(_)) => {
@@ -191,6 +201,10 @@ impl ContactTable {
                            they touch the smooth surface";
             return error("surface", message);
         }
-        Ok(ContactSpec { stiffness, stiffness_per_length, law, tolerance, max_iterations, surface })
+        if round.is_some() && law != ContactLaw::Rest {
+            let message = "only contact at rest is rounded: leave round out, or law";
+            return error("round", message);
+        }
+        Ok(ContactSpec { stiffness, stiffness_per_length, law, tolerance, max_iterations, surface, round })
     }
 }

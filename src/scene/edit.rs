@@ -48,9 +48,15 @@ impl<'a> SceneText<'a> {
         Ok(())
     }
 
-    /// Removes the table `name`, if it is there.
-    pub fn remove(&mut self, name: &str) {
-        self.document.remove(name);
+    /// Removes the table or the key at `path`, whose names are joined by points, if it is there.
+    pub fn remove(&mut self, path: &str) {
+        let mut table: &mut dyn TableLike = self.document.as_table_mut();
+        let (tables, name) = path.rsplit_once('.').unwrap_or(("", path));
+        for outer in tables.split_terminator('.') {
+            let Some(inner) = table.get_mut(outer).and_then(Item::as_table_like_mut) else { return };
+            table = inner;
+        }
+        table.remove(name);
     }
 
     /// Moves the object by `motion` (m): its centre, the height below which it is held, and its inclusions.
@@ -115,10 +121,17 @@ fn set_vector(table: &mut dyn TableLike, name: &str, vector: DVec3) {
     set(table.entry(name).or_insert(Item::None), value);
 }
 
-/// Puts another value in the place of one; a comment behind it stays.
+/// Puts another value in the place of one; a comment behind it stays in its column, or a blank behind a value that
+/// reaches that far.
 fn set(item: &mut Item, mut value: Value) {
     if let Some(old) = item.as_value() {
-        *value.decor_mut() = old.decor().clone();
+        let width = |value: &Value| value.clone().decorated("", "").to_string().chars().count();
+        let suffix = old.decor().suffix().and_then(|suffix| suffix.as_str()).unwrap_or_default();
+        let comment = suffix.trim_start_matches(' ');
+        let column = width(old) + suffix.len() - comment.len();
+        let blanks = if comment.starts_with('#') { column.saturating_sub(width(&value)).max(1) } else { 0 };
+        let prefix = old.decor().prefix().and_then(|prefix| prefix.as_str()).unwrap_or(" ").to_owned();
+        value = value.decorated(prefix, format!("{:blanks$}{comment}", ""));
     }
     *item = Item::Value(value);
 }
@@ -192,6 +205,17 @@ mod tests {
         edit.move_object(DVec3::X);
         let moved = text.replace("obj\"\n", "obj\"\ncentre = [1.0, 0.0, 0.0]\n");
         assert_eq!(edit.to_string(), moved.replace("[1, 0, 0]", "[2.0, 0.0, 0.0]"));
+    }
+
+    #[test]
+    fn comments_keep_their_column_and_a_blank() {
+        let text = "[object.mesh]\ncentre = [1, 0, 0]    # m\n[object.ground]\nbelow = -0.05         # m, height\nclamp = true # a\n";
+        let mut edit = SceneText::new(text, Path::new("a.toml")).unwrap();
+        edit.move_object(DVec3::new(0.125, 0.25, 0.012_345_678));
+        edit.remove("object.ground.clamp");
+        edit.remove("object.absent.clamp");
+        let moved = "[object.mesh]\ncentre = [1.125, 0.25, 0.012345678] # m\n[object.ground]\nbelow = -0.037654322  # m, height\n";
+        assert_eq!(edit.to_string(), moved);
     }
 
     #[test]

@@ -176,11 +176,12 @@ impl Scene {
     /// When the scene is not valid, or the law was removed; the message names the remedy.
     pub fn of_dataset(text: &str, path: impl AsRef<Path>, law: &str) -> Result<Self, Error> {
         let mut scene = Self::parse(text, &path)?;
-        scene.contact.law = ContactLaw::from_str(law, true).map_err(|_| {
+        let law = ContactLaw::from_str(law, true).map_err(|_| {
             let message =
                 format!("it was solved by `{}`, which is no law of a scene: bake it anew", crate::names::escaped(law));
             Checker { path: path.as_ref(), text }.at("contact", message)
         })?;
+        scene.contact = scene.contact.by(law);
         Ok(scene)
     }
 }

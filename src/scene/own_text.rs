@@ -1,7 +1,7 @@
 //! A scene's text brought to what the scene has become, so that a dataset's scene says what was baked.
 
 use super::contact::LAW_KEYS;
-use super::{AxisSpec, Scene};
+use super::{AxisSpec, ContactLaw, Scene};
 use crate::Error;
 use toml::{Table, Value};
 
@@ -35,6 +35,7 @@ impl Scene {
         if let Some(contact) = text.get_mut("contact").and_then(Value::as_table_mut) {
             contact.retain(|key, _| !LAW_KEYS.contains(&key));
             contact.insert(LAW_KEYS[0].into(), law);
+            contact.retain(|key, _| key != "round" || self.contact.law == ContactLaw::Rest);
         }
         let Self { text, grid, haptics, contact, .. } = Self::parse(&text.to_string(), &self.path)?;
         Ok(Self { text, grid, haptics, contact, ..self.clone() })
@@ -44,7 +45,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{ContactLaw, Interpolation};
+    use crate::scene::Interpolation;
 
     #[test]
     fn the_text_says_what_the_scene_has_become() {

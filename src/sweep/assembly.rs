@@ -2,8 +2,8 @@
 //! Memory does not grow with the grid.
 
 use super::{
-    columns::Shape,
-    table::{Block, Table},
+    table::Table,
+    tile::{Shape, Tile},
 };
 use crate::Error;
 use crate::dataset::{
@@ -48,7 +48,7 @@ impl<'a> Results<'a> {
     }
 
     fn contacts_before(&self) -> Vec<usize> {
-        let rows = |piece| self.runs(piece).map(|(block, points)| block.rows(points).len()).sum();
+        let rows = |piece| self.runs(piece).map(|(tile, points)| tile.rows(points).len()).sum();
         let counts: Vec<usize> = (0..self.points.div_ceil(PIECE)).into_par_iter().map(rows).collect();
         let mut before = vec![0];
         before.extend(counts.into_iter().scan(0, |sum, count| {
@@ -58,7 +58,7 @@ impl<'a> Results<'a> {
         before
     }
 
-    fn runs(&self, piece: usize) -> impl Iterator<Item = (Block<'_>, Range<usize>)> {
+    fn runs(&self, piece: usize) -> impl Iterator<Item = (&Tile<'_>, Range<usize>)> {
         self.table.runs(piece * PIECE..self.points.min((piece + 1) * PIECE))
     }
 
@@ -138,16 +138,16 @@ impl TensorContents for Contents<'_> {
         if let (Some(end), 0) = (end, piece) {
             writer.write_all(&end.to_le_bytes())?;
         }
-        for (block, points) in results.runs(piece) {
+        for (tile, points) in results.runs(piece) {
             if results.stop.load(Ordering::Relaxed) {
                 return Err(io::Error::other("stopped"));
             }
-            let bytes = block.bytes(array, points.clone(), results.size(array));
+            let bytes = tile.column(array, points.clone(), results.size(array));
             let Some(before) = end else {
                 writer.write_all(bytes)?;
                 continue;
             };
-            let shift = before.wrapping_sub(block.rows(points).start as u64);
+            let shift = before.wrapping_sub(tile.rows(points).start as u64);
             for bytes in bytes.as_chunks().0 {
                 let shifted = shift.wrapping_add(u64::from_le_bytes(*bytes));
                 writer.write_all(&shifted.to_le_bytes())?;

@@ -118,13 +118,13 @@ impl Bake<'_> {
         let mut chosen = ChosenBackend::open(at_first, &model)?;
         let mut sweep = sweep_of(scene, &object, &model, [chosen.name(), &chosen.adapter(), date], measured)?;
         if at_first != backend {
-            let better = backend.for_work(sweep.seconds_on(&mut chosen)?);
+            let better = backend.for_work(sweep.predict(&mut chosen, true)?);
             if better != at_first {
                 chosen = ChosenBackend::open(better, &model)?;
                 sweep.solved_by(&chosen);
             }
         }
-        sweep.aim_at(aim);
+        sweep.binding.provenance.aim = aim;
         let error = object.lattice_error(&model.compliance);
         sweep
             .warnings

@@ -3,13 +3,12 @@
 
 use super::{
     Backend, Footprint, FreeSpace, Progress, Run, Sweep,
-    columns::Columns,
     error::{miscounted, no_memory, stopped},
     free_space::FreeGaps,
     part::Part,
     report::RunFacts,
-    table::Block,
     tally::Tally,
+    tile::Tile,
 };
 use crate::{
     Error, JointVector,
@@ -21,7 +20,7 @@ use std::{
     collections::VecDeque,
     ops::Range,
     panic::resume_unwind,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{
         atomic::Ordering,
         mpsc::{Receiver, SyncSender, sync_channel},
@@ -38,92 +37,33 @@ const CHUNK_TIME: Duration = Duration::from_millis(250);
 pub(super) const BEHIND: usize = 2;
 
 /// Where a sweep's results go as they come.
-pub(super) trait Store: Send {
-    /// Adds a chunk whose first point has number `first`, and leaves columns for another.
-    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), Error>;
-    /// Adds something that provenance will tell.
-    fn note(&mut self, notice: &str) -> Result<(), Error>;
-    /// Returns where an interrupted sweep continues from.
-    fn path(&self) -> Option<&Path>;
-}
-
-impl Store for Part {
-    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), Error> {
-        Part::append(self, &Block::of(chunk, first))
-    }
-    fn note(&mut self, notice: &str) -> Result<(), Error> {
-        Part::note(self, notice)
-    }
-    fn path(&self) -> Option<&Path> {
-        Some(Part::path(self))
-    }
-}
-
-/// In memory: chunks by the number of their first point.
-impl Store for Vec<(usize, Columns)> {
-    fn append(&mut self, first: usize, chunk: &mut Columns) -> Result<(), Error> {
-        self.push((first, std::mem::take(chunk)));
-        Ok(())
-    }
-    fn note(&mut self, _notice: &str) -> Result<(), Error> {
-        Ok(())
-    }
-    fn path(&self) -> Option<&Path> {
-        None
-    }
+pub(super) enum Store<'a> {
+    Part(&'a mut Part),
+    /// In memory, as they come.
+    Memory(&'a mut Vec<Tile<'static>>),
 }
 
 /// What is sent to a store.
 #[expect(clippy::large_enum_variant, reason = "a few at a time; a box would be memory for every chunk")]
 enum Entry {
-    /// Results of the points from this number on.
-    Chunk(usize, Columns),
+    Tile(Tile<'static>),
+    /// Something that provenance will tell.
     Notice(String),
 }
 
-/// Hands `entries` to `store` until there are no more, or it fails; columns that are kept are given back as `room` for
-/// others.
-fn keep(store: &mut dyn Store, entries: Receiver<Entry>, room: SyncSender<Columns>) -> Result<(), Error> {
-    entries.into_iter().try_for_each(|entry| match entry {
-        Entry::Chunk(first, mut columns) => {
-            store.append(first, &mut columns)?;
-            // Where no other chunk follows nobody needs it.
-            let _ = room.send(columns);
-            Ok(())
+impl Store<'_> {
+    /// Keeps an entry, and leaves room for another tile.
+    fn keep(&mut self, entry: Entry) -> Result<Option<Tile<'static>>, Error> {
+        match (self, entry) {
+            (Self::Part(part), Entry::Tile(tile)) => part.append(&tile).map(|()| Some(tile)),
+            (Self::Part(part), Entry::Notice(notice)) => part.note(&notice).map(|()| None),
+            (Self::Memory(tiles), Entry::Tile(tile)) => {
+                tiles.push(tile);
+                Ok(Some(Tile::default()))
+            }
+            (Self::Memory(_), Entry::Notice(_)) => Ok(None),
         }
-        Entry::Notice(notice) => store.note(&notice),
-    })
-}
-
-/// Where chunks are sent to be kept, and columns come back from, a few in all.
-struct Kept {
-    entries: SyncSender<Entry>,
-    room: Receiver<Columns>,
-    columns: usize,
-}
-
-impl Kept {
-    /// Empty columns; `None` where the store has failed.
-    fn columns(&mut self) -> Option<Columns> {
-        if self.columns <= BEHIND {
-            self.columns += 1;
-            return Some(Columns::default());
-        }
-        let mut columns = self.room.recv().ok()?;
-        columns.clear();
-        Some(columns)
     }
-
-    /// Sends an entry; `None` where the store has failed.
-    fn send(&self, entry: Entry) -> Option<()> {
-        self.entries.send(entry).ok()
-    }
-}
-
-/// State of a sweep before a run.
-pub(super) struct Begun {
-    pub tally: Tally,
-    pub provenance: Provenance,
 }
 
 /// Results of a run.
@@ -184,46 +124,49 @@ impl Chunk {
 }
 
 impl Sweep<'_> {
-    /// Solves the points that `begun` lacks.
+    /// Solves the points that `tally` has not counted.
     pub(super) fn solve<B: Backend>(
         &self,
         backend: &mut B,
         run: &mut Run<'_>,
-        begun: Begun,
-        footprint: Footprint,
-        store: &mut dyn Store,
+        (tally, provenance): (Tally, Provenance),
+        mut store: Store<'_>,
     ) -> Result<Solved, Error> {
-        let part = store.path().map(Path::to_path_buf);
+        let part = if let Store::Part(part) = &store { Some(part.path().to_path_buf()) } else { None };
         let ((entries, to_keep), (back, room)) = (sync_channel(1 + BEHIND), sync_channel(1 + BEHIND));
-        let kept = Kept { entries, room, columns: 0 };
+        // As many as there is room for: none waits.
+        (0..=BEHIND).for_each(|_| drop(back.send(Tile::default())));
+        let keep = move |entry| {
+            // Where no other chunk follows nobody needs the room.
+            store.keep(entry).map(|room| room.into_iter().for_each(|room| drop(back.send(room))))
+        };
         thread::scope(|scope| {
             let keeper = thread::Builder::new().name("keeper".into());
-            let keeper = keeper.spawn_scoped(scope, move || keep(store, to_keep, back)).map_err(|why| {
+            let keeper = keeper.spawn_scoped(scope, move || to_keep.into_iter().try_for_each(keep)).map_err(|why| {
                 error!(
                     "no thread can be had that keeps the results: {why}; close other programs, or raise the limits on \
                      processes and memory (ulimit -u, ulimit -v)"
                 )
             })?;
-            let solved = self.solve_chunks(backend, run, begun, footprint, part, kept);
+            let solved = self.solve_chunks(backend, run, (tally, provenance), part, (entries, room));
             // What a store says comes first: a sweep whose store has failed only knows that nobody takes its results.
             keeper.join().unwrap_or_else(|panic| resume_unwind(panic))?;
             solved
         })
     }
 
-    /// Solves the points that `begun` lacks, and sends what is to be kept; `part` is where that is.
+    /// Solves the points that `tally` has not counted, and sends what is to be kept; `part` is where that is.
     fn solve_chunks<B: Backend>(
         &self,
         backend: &mut B,
         run: &mut Run<'_>,
-        begun: Begun,
-        footprint: Footprint,
+        (tally, provenance): (Tally, Provenance),
         part: Option<PathBuf>,
-        kept: Kept,
+        (entries, room): (SyncSender<Entry>, Receiver<Tile<'static>>),
     ) -> Result<Solved, Error> {
         let (start, left_before) = (Instant::now(), backend.left_to_cpu());
-        let Begun { tally, provenance } = begun;
         let resumed = tally.points;
+        let footprint = self.footprint(run.chunk, part.is_none());
         let mut course = Course {
             sweep: self,
             free_space: self.free_space(),
@@ -236,7 +179,8 @@ impl Sweep<'_> {
             run,
             tally,
             provenance,
-            kept,
+            entries,
+            room,
             part,
             footprint,
             resumed,
@@ -283,7 +227,9 @@ struct Course<'c, 'r> {
     size: ChunkSize,
     tally: Tally,
     provenance: Provenance,
-    kept: Kept,
+    entries: SyncSender<Entry>,
+    /// Tiles that were kept, to be filled again: a few in all.
+    room: Receiver<Tile<'static>>,
     /// Where results are kept.
     part: Option<PathBuf>,
     footprint: Footprint,
@@ -308,7 +254,7 @@ impl Course<'_, '_> {
             rate: (tally.points - self.resumed) as f64 / seconds,
             footprint: self.footprint,
             forecast: self.sweep.forecast,
-            mesh_ripple: self.sweep.mesh_ripple(),
+            mesh_ripple: self.sweep.binding.provenance.mesh_ripple,
         });
     }
 
@@ -318,7 +264,7 @@ impl Course<'_, '_> {
 
     /// The points that are left to cut off, as far as they are consecutive.
     fn rest(&self) -> Range<usize> {
-        self.sweep.shard.rest(self.sweep.grid.points(), self.cut)
+        self.sweep.binding.shard.rest(self.sweep.binding.grid.points(), self.cut)
     }
 
     /// Looks for free space about the next point, if that was not done.
@@ -365,18 +311,19 @@ impl Course<'_, '_> {
         if equilibria.len() != solved {
             return Err(miscounted(solved, equilibria.len()));
         }
-        let mut columns = self.kept.columns().ok_or_else(|| self.stopped())?;
-        let shape = self.sweep.shape;
+        let mut tile = self.room.recv().map_err(|_| self.stopped())?;
+        tile.clear(chunk.points.start);
+        let shape = self.sweep.binding.shape;
         let mut equilibria = equilibria.iter();
         for point in chunk.points.clone() {
             match chunk.free_gap(point) {
-                Some(gap) => columns.push_free(gap, shape),
-                None => equilibria.next().into_iter().for_each(|solved| columns.push(solved, shape)),
+                Some(gap) => tile.push_free(gap, shape),
+                None => equilibria.next().into_iter().for_each(|solved| tile.push(solved, shape)),
             }
         }
         self.skipped += chunk.points.len() - solved;
-        self.tally.add(&Block::of(&columns, chunk.points.start));
-        self.kept.send(Entry::Chunk(chunk.points.start, columns)).ok_or_else(|| self.stopped())?;
+        self.tally.add(&tile, 0..tile.points());
+        self.entries.send(Entry::Tile(tile)).map_err(|_| self.stopped())?;
         self.size.adapt(solved, self.taken.elapsed());
         self.taken = Instant::now();
         self.tell();
@@ -417,7 +364,7 @@ impl Work for Course<'_, '_> {
         }
         let chunk = self.chunks.get(self.given)?;
         self.given += 1;
-        Some(chunk.solved().map(|point| self.sweep.grid.configuration(point)).collect())
+        Some(chunk.solved().map(|point| self.sweep.binding.grid.configuration(point)).collect())
     }
 
     fn rewind(&mut self) {
@@ -435,7 +382,7 @@ impl Work for Course<'_, '_> {
     fn note(&mut self, notice: String) {
         let first = self.chunks.front().map_or_else(|| self.rest().start, |chunk| chunk.points.start);
         let notice = format!("from grid point {first} on: {notice}");
-        if self.kept.send(Entry::Notice(notice.clone())).is_none() && self.failure.is_none() {
+        if self.entries.send(Entry::Notice(notice.clone())).is_err() && self.failure.is_none() {
             self.failure = Some(self.stopped());
         }
         self.provenance.notices.push(notice);

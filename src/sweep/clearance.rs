@@ -108,8 +108,6 @@ impl fmt::Display for Clearance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sweep::{BackendChoice, Bake};
-    use std::sync::atomic::AtomicBool;
 
     /// A finger that slides down onto a ball, whose top is at z = 0.05 m, and ends before it.
     const SCENE: &str = r#"
@@ -131,17 +129,7 @@ mod tests {
     "#;
 
     fn baked(scene: &Scene) -> Dataset {
-        let stop = AtomicBool::new(false);
-        let bake = Bake {
-            scene,
-            backend: BackendChoice::Cpu,
-            measured: Some(0),
-            aim: None,
-            date: "",
-            stop: &stop,
-            progress: &mut |_| (),
-        };
-        bake.in_memory().unwrap().0
+        crate::sweep::baked(scene).unwrap().0
     }
 
     #[test]

@@ -12,11 +12,7 @@ use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 use std::{
     collections::VecDeque,
     convert::Infallible,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicUsize, Ordering},
-        mpsc::{Receiver, SyncSender, sync_channel},
-    },
+    sync::mpsc::{Receiver, channel},
     time::SystemTime,
 };
 
@@ -93,78 +89,47 @@ impl Backend for CpuBackend<'_> {
                 while shared_out.len() < SHARED_OUT
                     && let Some(configurations) = work.next()
                 {
-                    shared_out.push_back(Chunk::share_out(scope, &self.solvers, configurations));
+                    shared_out.push_back(share_out(scope, &self.solvers, configurations));
                 }
                 // Others are shared out first: there is time to take these while they are solved.
                 if let Some(equilibria) = solved.take() {
                     work.take(equilibria);
                 }
-                // Nothing comes of a chunk in which a thread has panicked, which the scope passes on.
-                solved = shared_out.pop_front().and_then(|chunk| chunk.recv().ok());
-                if solved.is_none() {
+                let Some((count, shares)) = shared_out.pop_front() else { return };
+                let mut shares: Vec<(usize, Vec<Equilibrium>)> = shares.into_iter().collect();
+                // Nothing comes of a share whose thread has panicked, which the scope passes on.
+                if shares.len() < count {
                     return;
                 }
+                shares.sort_unstable_by_key(|(number, _)| *number);
+                solved = Some(shares.into_iter().flat_map(|(_, equilibria)| equilibria).collect());
             }
         });
         Ok(())
     }
 }
 
-/// A chunk of which all threads solve shares.
-struct Chunk {
+/// Lets the threads of `scope` solve shares of `configurations`. Returns how many there are, and where the equilibria of
+/// each come, with its number.
+fn share_out<'s>(
+    scope: &Scope<'s>,
+    solvers: &'s Solvers<'_>,
     configurations: Vec<JointVector>,
-    /// Equilibria of each share that is solved.
-    shares: Vec<Mutex<Vec<Equilibrium>>>,
-    /// Number of shares that are not.
-    left: AtomicUsize,
-    /// Where the equilibria go.
-    whole: SyncSender<Vec<Equilibrium>>,
-}
-
-impl Chunk {
-    /// Lets the threads of `scope` solve `configurations`; all equilibria come at once.
-    fn share_out<'s>(
-        scope: &Scope<'s>,
-        solvers: &'s Solvers<'_>,
-        configurations: Vec<JointVector>,
-    ) -> Receiver<Vec<Equilibrium>> {
-        let (whole, equilibria) = sync_channel(1);
-        let count = configurations.len().div_ceil(SHARE);
-        let shares = (0..count).map(|_| Mutex::default()).collect();
-        let chunk = Arc::new(Self { configurations, shares, left: AtomicUsize::new(count), whole });
-        if count == 0 {
-            chunk.conclude();
+) -> (usize, Receiver<(usize, Vec<Equilibrium>)>) {
+    let (count, (sender, shares)) = (configurations.len().div_ceil(SHARE), channel());
+    // In the pool, whose threads take shares from the one that has them without a queue that all wait for.
+    scope.spawn(move |scope| {
+        for (number, share) in configurations.chunks(SHARE).enumerate() {
+            let (share, sender) = (share.to_vec(), sender.clone());
+            scope.spawn(move |_| {
+                let mut solver = solvers.own();
+                let equilibria = share.iter().map(|q| solver.solve(q)).collect();
+                // Where nobody waits for them any more nobody needs them.
+                let _ = sender.send((number, equilibria));
+            });
         }
-        // In the pool, whose threads take shares from the one that has them without a queue that all wait for.
-        scope.spawn(move |scope| {
-            for share in 0..count {
-                let chunk = Arc::clone(&chunk);
-                scope.spawn(move |_| chunk.solve(share, solvers));
-            }
-        });
-        equilibria
-    }
-
-    fn solve(&self, share: usize, solvers: &Solvers<'_>) {
-        let configurations = self.configurations.chunks(SHARE).nth(share).unwrap_or_default();
-        let mut solver = solvers.own();
-        let equilibria = configurations.iter().map(|q| solver.solve(q)).collect();
-        drop(solver);
-        *self.shares[share].lock().unwrap_or_else(PoisonError::into_inner) = equilibria;
-        if self.left.fetch_sub(1, Ordering::AcqRel) == 1 {
-            self.conclude();
-        }
-    }
-
-    /// Hands all equilibria over.
-    fn conclude(&self) {
-        let mut all = Vec::with_capacity(self.configurations.len());
-        for share in &self.shares {
-            all.append(&mut share.lock().unwrap_or_else(PoisonError::into_inner));
-        }
-        // Where nobody waits for them any more nobody needs them.
-        let _ = self.whole.send(all);
-    }
+    });
+    (count, shares)
 }
 
 #[cfg(test)]

@@ -1,9 +1,6 @@
 //! The memory and disk that a sweep takes, stated before it begins.
 
-use super::{
-    chunks::BEHIND,
-    columns::{self, Shape},
-};
+use super::{chunks::BEHIND, tile::Shape};
 use crate::{
     JointVector,
     contact::{CHUNKS_IN_FLIGHT, Equilibrium, NodeForce, Touch},
@@ -39,7 +36,7 @@ impl Bounds {
 /// Results of `points` points at each of which `touching` nodes of the proxy touch (bytes).
 pub(super) fn results(points: usize, touching: usize, shape: Shape) -> usize {
     let contacts = if shape.extras.forces { node_forces(touching, shape) } else { 0 };
-    columns::size(points, shape, points.saturating_mul(contacts))
+    shape.size(points, points.saturating_mul(contacts))
 }
 
 /// Chunks on their way: `solved` configurations of each and their equilibria, and the columns of `points` points, and
@@ -49,7 +46,7 @@ pub(super) fn chunk(solved: usize, points: usize, touching: usize, shape: Shape)
     let lists = 2 * (node_forces(touching, shape) * size_of::<NodeForce>() + touching * size_of::<Touch>());
     let each = size_of::<JointVector>() + size_of::<Equilibrium>() + lists;
     let contacts = if shape.extras.forces { 2 * solved.saturating_mul(node_forces(touching, shape)) } else { 0 };
-    let kept = columns::size(points, shape, contacts);
+    let kept = shape.size(points, contacts);
     let under_way = solved.saturating_mul(each).saturating_add(points.saturating_mul(size_of::<Option<f32>>()));
     under_way.saturating_mul(CHUNKS_IN_FLIGHT).saturating_add(kept.saturating_mul(1 + BEHIND))
 }

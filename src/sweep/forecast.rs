@@ -3,10 +3,7 @@
 //! Points of the grid are drawn at random. Those that are not free with their neighbours are solved by the sweep's own
 //! backend. The fraction in contact, the number of contact forces and the time per point follow.
 
-use super::{
-    Backend, Sweep,
-    columns::{self, Shape},
-};
+use super::{Backend, Sweep, tile::Shape};
 use crate::random::Random;
 use serde::Serialize;
 use std::time::Instant;
@@ -48,31 +45,21 @@ pub struct Forecast {
 }
 
 impl Sweep<'_> {
-    /// Returns the time in which `cpu` solves the whole grid, zero where that is small (s). The sample is kept as the
-    /// forecast.
+    /// Samples the sweep's points with `backend`, and keeps the forecast that follows. Returns the time in which the
+    /// backend solves the whole grid, zero where that is small or not known (s). `is_timed`: whether a sample's time counts.
     ///
     /// # Errors
     /// Those of the backend.
-    pub fn seconds_on<B: Backend>(&mut self, cpu: &mut B) -> Result<f64, B::Error> {
-        self.predict(cpu, true)?;
-        Ok(self.forecast.and_then(|forecast| forecast.seconds).unwrap_or(0.0))
-    }
-
-    /// Samples the sweep's points with `backend`, and keeps the forecast that follows. `is_timed`: whether a sample's
-    /// time counts.
-    ///
-    /// # Errors
-    /// Those of the backend.
-    pub fn predict<B: Backend>(&mut self, backend: &mut B, is_timed: bool) -> Result<(), B::Error> {
-        if self.grid.points() >= FEWEST_POINTS {
+    pub fn predict<B: Backend>(&mut self, backend: &mut B, is_timed: bool) -> Result<f64, B::Error> {
+        if self.binding.grid.points() >= FEWEST_POINTS {
             self.forecast = Some(self.sampled(backend, is_timed)?);
         }
-        Ok(())
+        Ok(self.forecast.and_then(|forecast| forecast.seconds).unwrap_or(0.0))
     }
 
     /// What follows from a sample of the points, however few there are.
     pub(super) fn sampled<B: Backend>(&self, backend: &mut B, is_timed: bool) -> Result<Forecast, B::Error> {
-        let points = self.grid.points();
+        let points = self.binding.grid.points();
         let mut random = Random::new(SEED);
         let most = DRAWN.min(points);
         let free_space = self.free_space();
@@ -86,7 +73,7 @@ impl Sweep<'_> {
                 let is_free =
                     free_space.as_mut().is_some_and(|(space, proximity)| space.is_surrounded(proximity, point));
                 if !is_free {
-                    portion.push(self.grid.configuration(point));
+                    portion.push(self.binding.grid.configuration(point));
                 }
                 sampled += 1;
             }
@@ -104,13 +91,13 @@ impl Sweep<'_> {
         let seconds = per_sample * solving;
         let bytes = |shape: Shape| {
             let contacts = if shape.extras.forces { (per_sample * contacts as f64).round() as usize } else { 0 };
-            columns::size(points, shape, contacts)
+            shape.size(points, contacts)
         };
         Ok(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,
             seconds: is_timed.then_some(seconds),
             disk: bytes(self.stored()),
-            part: bytes(self.shape),
+            part: bytes(self.binding.shape),
             sampled,
         })
     }

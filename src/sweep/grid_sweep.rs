@@ -6,16 +6,16 @@
 use super::{
     Backend, ChosenBackend, Footprint, Forecast, FreeSpace, SweepReport,
     assembly::{self, Results},
-    chunks::{Begun, Solved, together},
-    columns::{Columns, Shape},
+    chunks::{Solved, Store, together},
     error::{in_grid, in_part, no_memory, stopped, too_many_joints, unwritable},
     footprint::{self, Bounds},
     lowest,
     measured::{ErrorCheck, MOST_CONFIGURATIONS},
     part::{Binding, Part},
     shard::Shard,
-    table::{Block, Table},
+    table::Table,
     tally::Tally,
+    tile::Shape,
 };
 use crate::{
     Error, MAX_AXES,
@@ -64,17 +64,9 @@ pub struct Run<'a> {
 
 /// A sweep, ready to run.
 pub struct Sweep<'a> {
-    pub(super) grid: Grid,
-    /// Which of the grid's points are solved.
-    pub(super) shard: Shard,
+    /// Everything on which its results depend.
+    pub(super) binding: Binding,
     surface: Surface,
-    /// See [`Binding::object`].
-    object: u32,
-    scene: String,
-    scene_path: String,
-    provenance: Provenance,
-    /// Columns that are kept for each point until the dataset is whole.
-    pub(super) shape: Shape,
     /// Whether the dataset holds contact forces.
     pub(super) with_forces: bool,
     /// The object's skin.
@@ -121,17 +113,15 @@ impl<'a> Sweep<'a> {
         }
         grid.check().map_err(in_grid)?;
         let with_forces = scene.graphics.is_some();
-        Ok(Self {
+        let binding = Binding {
             shape: Shape {
                 joints: grid.joints(),
                 surface_nodes: object.surface_nodes,
                 extras: Extras { forces: with_forces, tangent: false, slip: scene.haptics.uses_slip() },
             },
-            with_forces,
             grid,
             shard: Shard::WHOLE,
             object: crc32fast::hash(object.key()),
-            surface: Surface::of(object),
             scene: scene.text.clone(),
             scene_path: std::path::absolute(&scene.path).unwrap_or_default().to_string_lossy().into_owned(),
             provenance: Provenance {
@@ -141,13 +131,13 @@ impl<'a> Sweep<'a> {
                 backend: backend.into(),
                 adapter: adapter.into(),
                 date: date.into(),
-                notices: Vec::new(),
-                error: None,
-                mesh_ripple: None,
-                relaxation: None,
-                friction: None,
-                aim: None,
+                ..Provenance::default()
             },
+        };
+        Ok(Self {
+            binding,
+            surface: Surface::of(object),
+            with_forces,
             skin: object.skin,
             warnings: object.warnings.clone(),
             model: None,
@@ -160,12 +150,7 @@ impl<'a> Sweep<'a> {
 
     /// States how much a contact point of `model` feels the mesh, which is that of the scene.
     pub fn diagnose(&mut self, model: &Model<'_>) {
-        self.provenance.mesh_ripple = MeshRipple::new(model);
-    }
-
-    /// Returns how much a contact point feels the mesh, where that was looked at.
-    pub(super) fn mesh_ripple(&self) -> Option<MeshRipple> {
-        self.provenance.mesh_ripple
+        self.binding.provenance.mesh_ripple = MeshRipple::new(model);
     }
 
     /// Skips the points that [`FreeSpace`] proves free: `model` is that of the scene. Nothing is changed but gaps
@@ -174,7 +159,8 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// When the model's proxy has other joints.
     pub fn skip_free_space(&mut self, model: &'a Model<'a>) -> Result<(), Error> {
-        self.model = Some(self.fitting(model)?);
+        // The depth below a rounded surface may change by more than its node moves.
+        self.model = Some(self.fitting(model)?).filter(|model| model.rounded.is_none());
         Ok(())
     }
 
@@ -186,7 +172,7 @@ impl<'a> Sweep<'a> {
     pub fn find_lowest(&mut self, model: &'a Model<'a>) -> Result<(), Error> {
         if lowest::applies(model.contact.law) {
             self.lowest = Some(self.fitting(model)?);
-            self.shape.extras.forces = true;
+            self.binding.shape.extras.forces = true;
         }
         Ok(())
     }
@@ -216,32 +202,27 @@ impl<'a> Sweep<'a> {
 
     /// Names another backend in the provenance. A forecast of time no longer holds where a GPU solves.
     pub(crate) fn solved_by(&mut self, backend: &ChosenBackend<'_>) {
-        self.provenance.backend = backend.name().into();
-        self.provenance.adapter = backend.adapter();
+        self.binding.provenance.backend = backend.name().into();
+        self.binding.provenance.adapter = backend.adapter();
         if let (Some(forecast), false) = (&mut self.forecast, backend.is_cpu_alone()) {
             forecast.seconds = None;
         }
     }
 
-    /// Notes that the grid was chosen for an error; see [`super::Bake::aim`].
-    pub fn aim_at(&mut self, aim: Option<f64>) {
-        self.provenance.aim = aim;
-    }
-
     /// Tangents are stored where the model that solves gives them.
     fn fitting(&mut self, model: &'a Model<'a>) -> Result<&'a Model<'a>, Error> {
         let joints = model.chain.joints.len();
-        if joints != self.grid.joints() {
-            return Err(in_grid(format_args!("{} axes for {joints} joints", self.grid.joints())));
+        if joints != self.binding.grid.joints() {
+            return Err(in_grid(format_args!("{} axes for {joints} joints", self.binding.grid.joints())));
         }
-        self.shape.extras.tangent = model.with_tangent;
+        self.binding.shape.extras.tangent = model.with_tangent;
         Ok(model)
     }
 
     /// The grid.
     #[must_use]
     pub fn grid(&self) -> &Grid {
-        &self.grid
+        &self.binding.grid
     }
 
     /// Returns the memory and disk space of a sweep in memory, or else into a file, with chunks of `chunk`
@@ -253,14 +234,14 @@ impl<'a> Sweep<'a> {
         let free_space = self.free_space();
         let together = points.min(if free_space.is_some() { together(solved) } else { solved });
         let slab = free_space.map_or(0, |free_space| 4 * free_space.largest_slab());
-        let results = |touching| footprint::results(points, touching, self.shape);
+        let results = |touching| footprint::results(points, touching, self.binding.shape);
         let memory = |touching| {
-            let chunk = footprint::chunk(solved, together, touching, self.shape).saturating_add(slab);
+            let chunk = footprint::chunk(solved, together, touching, self.binding.shape).saturating_add(slab);
             // In memory as they were solved, and once more as columns.
             chunk.saturating_add(if in_memory { results(touching).saturating_mul(2) } else { assembly::buffers() })
         };
         // A shard holds the forces from which lower equilibria are searched for.
-        let stored = if self.shard == Shard::WHOLE { self.stored() } else { self.shape };
+        let stored = if self.binding.shard == Shard::WHOLE { self.stored() } else { self.binding.shape };
         let disk = |touching| if in_memory { 0 } else { footprint::results(points, touching, stored) };
         Footprint { memory: Bounds::of(self.proxy_nodes, memory), disk: Bounds::of(self.proxy_nodes, disk) }
     }
@@ -278,25 +259,27 @@ impl<'a> Sweep<'a> {
     /// # Errors
     /// When there is no memory, the backend fails, or the sweep is stopped.
     pub fn run<B: Backend>(&self, backend: &mut B, mut run: Run<'_>) -> Result<(Dataset, SweepReport), Error> {
-        let footprint = self.footprint(run.chunk, true);
-        let (points, bytes) = (self.grid.points(), footprint.memory.least);
+        let (points, bytes) = (self.binding.grid.points(), self.footprint(run.chunk, true).memory.least);
         memory::check(bytes).map_err(|shortage| {
             error!(
                 "the grid's {points} points do not fit in memory: {shortage}; or haptize into a file (`haptize bake`), \
                  which takes little memory whatever the grid"
             )
         })?;
-        let mut chunks: Vec<(usize, Columns)> = Vec::new();
-        let begun = Begun { tally: Tally::default(), provenance: self.provenance.clone() };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut chunks)?;
-        let blocks = chunks.iter().map(|(first, columns)| Block::of(columns, *first)).collect();
-        let mut table = Table::new(self.shape, blocks);
+        let mut tiles = Vec::new();
+        let begun = (Tally::default(), self.binding.provenance.clone());
+        let solved = self.solve(backend, &mut run, begun, Store::Memory(&mut tiles))?;
+        let mut table = Table::new(self.binding.shape, tiles);
         let (report, provenance) = self.complete(solved, &mut table, run.stop, None)?;
         // Nothing stops it halfway.
         let never = AtomicBool::new(false);
         let mut results = Results::new(&table, points, self.stored(), &never);
-        let dataset = Dataset::of(&mut results, self.grid.clone()).map_err(|why| no_memory(points, bytes, why))?;
-        Ok((Dataset { surface: Some(self.surface.clone()), scene: self.scene.clone(), provenance, ..dataset }, report))
+        let dataset =
+            Dataset::of(&mut results, self.binding.grid.clone()).map_err(|why| no_memory(points, bytes, why))?;
+        Ok((
+            Dataset { surface: Some(self.surface.clone()), scene: self.binding.scene.clone(), provenance, ..dataset },
+            report,
+        ))
     }
 
     /// Sweeps into the file `output`, keeping what is done in [`Sweep::part_of`] it until the file is whole. Memory does
@@ -321,17 +304,15 @@ impl<'a> Sweep<'a> {
         // The part grows beside the file that a link leads to: only there can that be replaced.
         let output = &dataset::resolved(output).map_err(|source| unwritable(output, &source))?;
         dataset::check_place(output)?;
-        let mut binding = self.binding();
+        let mut binding = self.binding.clone();
         let (mut part, tally) = Part::open(&Self::part_of(output), resume, &mut binding)?;
         let mut provenance = binding.provenance;
         if !provenance.notices.is_empty() && tally.points < self.points() {
-            let Provenance { backend, adapter, .. } = &self.provenance;
+            let Provenance { backend, adapter, .. } = &self.binding.provenance;
             let notice = format!("from grid point {} on: resumed on {backend} ({adapter})", tally.points);
             part.note(&notice)?;
             provenance.notices.push(notice);
         }
-        let footprint = self.footprint(run.chunk, false);
-        let begun = Begun { tally, provenance };
         let stop = run.stop;
         let kept_in = part.path().to_path_buf();
         let unwritten = |why: Error, points| {
@@ -341,11 +322,11 @@ impl<'a> Sweep<'a> {
             let part = kept_in.display();
             error!("{why}; all points are kept in {part}: afterwards give the same command, a bake with --resume")
         };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
+        let solved = self.solve(backend, &mut run, (tally, provenance), Store::Part(&mut part))?;
         let map = part.map().map_err(|source| in_part(&kept_in, &source))?;
-        let mut table = part.table(&map, self.shape)?;
+        let mut table = part.table(&map, self.binding.shape)?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
-        let heading = Heading { grid: &self.grid, provenance: &provenance, scene: &self.scene };
+        let heading = Heading { grid: &self.binding.grid, provenance: &provenance, scene: &self.binding.scene };
         let results = Results::new(&table, report.points, self.stored(), stop);
         results.assemble(output, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         drop(map);
@@ -353,27 +334,14 @@ impl<'a> Sweep<'a> {
         Ok(report)
     }
 
-    /// Returns everything on which its results depend.
-    pub(super) fn binding(&self) -> Binding {
-        Binding {
-            grid: self.grid.clone(),
-            shard: self.shard,
-            scene: self.scene.clone(),
-            scene_path: self.scene_path.clone(),
-            object: self.object,
-            shape: self.shape,
-            provenance: self.provenance.clone(),
-        }
-    }
-
     /// Number of points that are solved.
     pub(super) fn points(&self) -> usize {
-        self.shard.points(self.grid.points())
+        self.binding.shard.points(self.binding.grid.points())
     }
 
     /// Columns of the dataset.
     pub(super) fn stored(&self) -> Shape {
-        Shape { extras: Extras { forces: self.with_forces, ..self.shape.extras }, ..self.shape }
+        Shape { extras: Extras { forces: self.with_forces, ..self.binding.shape.extras }, ..self.binding.shape }
     }
 
     /// Finds the lowest equilibria and measures the error, as far as the sweep was asked to.
@@ -384,18 +352,20 @@ impl<'a> Sweep<'a> {
         stop: &AtomicBool,
         part: Option<&Path>,
     ) -> Result<(SweepReport, Provenance), Error> {
-        let (start, points) = (Instant::now(), self.grid.points());
+        let (start, points) = (Instant::now(), self.binding.grid.points());
         let stopped = || stopped(points, points, part);
         if let Some(model) = self.lowest {
-            let lowered = lowest::correct(&self.grid, model, self.shape, table, stop).ok_or_else(stopped)?;
+            let lowered =
+                lowest::correct(&self.binding.grid, model, self.binding.shape, table, stop).ok_or_else(stopped)?;
             if lowered.points > 0 {
-                solved.tally = Tally::of(table, points);
+                solved.tally = Tally::default();
+                table.runs(0..points).for_each(|(tile, rows)| solved.tally.add(tile, rows));
             }
             solved.facts.lowered = Some(lowered);
         }
         if let Some(error) = self.error {
             let contacts = solved.tally.statuses.in_contact();
-            match error.measure(&self.grid, table, contacts, stop) {
+            match error.measure(&self.binding.grid, table, contacts, stop) {
                 Ok(Some(measured)) => {
                     solved.provenance.error = Some(measured.error);
                     solved.provenance.notices.extend(measured.notice);
@@ -418,7 +388,7 @@ impl<'a> Sweep<'a> {
 
     /// Returns how free space is found, where it is.
     pub(super) fn free_space(&self) -> Option<FreeSpace<'_>> {
-        self.model.map(|model| FreeSpace::new(model, &self.grid))
+        self.model.map(|model| FreeSpace::new(model, &self.binding.grid))
     }
 }
 

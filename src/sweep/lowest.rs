@@ -21,8 +21,8 @@
 //! Memory: the new results, and one stretch of points at a time.
 
 use super::{
-    columns::{Columns, Replaced, Shape},
-    table::{PointResult, Table},
+    table::{Replaced, Table},
+    tile::{PointResult, Shape, Tile},
 };
 use crate::{
     JointVector,
@@ -275,7 +275,7 @@ pub(super) fn lower(
 
 impl Lattice for UniformGrid<'_, '_> {
     type Point = usize;
-    type Row = Columns;
+    type Row = Tile<'static>;
 
     fn configuration(&self, point: usize) -> JointVector {
         self.grid.configuration(point)
@@ -299,8 +299,8 @@ impl Lattice for UniformGrid<'_, '_> {
         self.table.forces(point)
     }
 
-    fn row(&self, _: &mut Solver<'_>, _: &JointVector, found: &Equilibrium) -> Columns {
-        let mut row = Columns::default();
+    fn row(&self, _: &mut Solver<'_>, _: &JointVector, found: &Equilibrium) -> Tile<'static> {
+        let mut row = Tile::default();
         row.push(found, self.shape);
         row
     }
@@ -316,7 +316,6 @@ mod tests {
     use crate::{
         dataset::{Extras, Stored},
         fixtures::grids,
-        sweep::table::Block,
     };
 
     const SHAPE: Shape =
@@ -330,34 +329,30 @@ mod tests {
             iterations: 3,
             residual: 1e-9,
             energy,
-            gap: -1.0,
-            tangent: None,
             torque: JointVector::from_slice(&[torque]),
             forces: (0..energy as u32).map(force).collect(),
-            slip: None,
-            touches: Vec::new(),
+            ..Equilibrium::free(-1.0, 1)
         }
     }
 
-    fn columns(energies: &[f64]) -> Columns {
-        let mut columns = Columns::default();
-        energies.iter().for_each(|&energy| columns.push(&equilibrium(energy, -1.0), SHAPE));
-        columns
+    fn tile(first: usize, energies: &[f64]) -> Tile<'static> {
+        let mut tile = Tile::default();
+        tile.clear(first);
+        energies.iter().for_each(|&energy| tile.push(&equilibrium(energy, -1.0), SHAPE));
+        tile
     }
 
     #[test]
     fn a_point_starts_from_neighbours_that_predict_less_energy() {
         // U grows by 1 a step of 1 with torque -1; point 2 holds 0.5 too much.
         let grid = grids::grid(&[(0.0, 1.0, 5)]);
-        let five = columns(&[1.0, 2.0, 3.5, 4.0, 5.0]);
-        let mut table = Table::new(SHAPE, vec![Block::of(&five, 0)]);
+        let mut table = Table::new(SHAPE, vec![tile(0, &[1.0, 2.0, 3.5, 4.0, 5.0])]);
         let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
         let found: Vec<_> = (0..5).map(|point| starts(&around, point, |_| true)).collect();
         assert_eq!(found, [vec![], vec![], vec![1, 3], vec![], vec![]]);
         assert_eq!(starts(&around, 2, |n| n == 3), [3]);
         // Below the tolerance nothing is tried.
-        let near = columns(&[1.0, 2.0 + 0.5 * EDGE_TOLERANCE, 3.0]);
-        let mut table = Table::new(SHAPE, vec![Block::of(&near, 0)]);
+        let mut table = Table::new(SHAPE, vec![tile(0, &[1.0, 2.0 + 0.5 * EDGE_TOLERANCE, 3.0])]);
         let grid = grids::grid(&[(0.0, 1.0, 3)]);
         let around = UniformGrid { grid: &grid, table: &mut table, shape: SHAPE };
         assert!((0..3).all(|point| starts(&around, point, |_| true).is_empty()));
@@ -366,14 +361,13 @@ mod tests {
     /// New results in a table, and in the count of contacts.
     #[test]
     fn replaced_results_are_read_in_their_place() {
-        let (first, second) = (columns(&[1.0, 2.0]), columns(&[3.0, 0.0, 5.0]));
-        let mut table = Table::new(SHAPE, vec![Block::of(&first, 0), Block::of(&second, 2)]);
-        table.replaced = Replaced::from([(1, columns(&[4.0])), (3, columns(&[2.0]))]);
-        let expected = columns(&[1.0, 4.0, 3.0, 2.0, 5.0]);
+        let mut table = Table::new(SHAPE, vec![tile(0, &[1.0, 2.0]), tile(2, &[3.0, 0.0, 5.0])]);
+        table.replaced = Replaced::from([(1, tile(1, &[4.0])), (3, tile(3, &[2.0]))]);
+        let expected = tile(0, &[1.0, 4.0, 3.0, 2.0, 5.0]);
         for section in [Stored::Energy, Stored::ContactNodes, Stored::ContactForces, Stored::Status] {
             let size = SHAPE.bytes(section);
-            let runs = table.runs(0..5).map(|(block, points)| block.bytes(section, points, size).to_vec());
-            assert_eq!(runs.collect::<Vec<_>>().concat(), expected.bytes()[section as usize]);
+            let runs = table.runs(0..5).map(|(tile, points)| tile.column(section, points, size).to_vec());
+            assert_eq!(runs.collect::<Vec<_>>().concat(), expected.column(section, 0..5, size));
             assert_eq!(table.runs(1..4).map(|(_, points)| points).collect::<Vec<_>>(), [0..1, 0..1, 0..1]);
         }
         for (point, energy) in [1.0, 4.0, 3.0, 2.0, 5.0].into_iter().enumerate() {

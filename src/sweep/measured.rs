@@ -11,22 +11,18 @@
 //! An interpolation is formed of the whole grid where that has at most [`WHOLE`] points, else of the grid lines around
 //! each configuration, so that memory does not grow with the grid. The boundary layer then knows the surroundings only.
 
-use super::{
-    lowest,
-    reference::Reference,
-    table::{PointResult, Table},
-    thin_parts,
-};
+use super::{lowest, reference::Reference, table::Table, thin_parts, tile::PointResult};
 use crate::{
     Error, JointVector,
     contact::{Model, Solvers, Status},
-    dataset::{Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
+    dataset::{Axis, Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
     field::TorqueField,
-    random::Random,
-    scene::{ContactLaw, ContactSpec, EffortNorm, Interpolation},
+    random::{Random, mix},
+    scene::{ContactLaw, EffortNorm, Interpolation},
 };
 use rayon::prelude::*;
 use std::{
+    collections::BTreeSet,
     ops::Range,
     sync::atomic::{AtomicBool, Ordering},
 };
@@ -42,17 +38,13 @@ const SEED: u64 = 0x94d0_49bb_1331_11eb;
 /// days.
 pub const MOST_CONFIGURATIONS: usize = 1_000_000;
 
-/// Configurations that are drawn at a time (1): more takes memory, less goes through the grid oftener. Room for
-/// [`CONFIGURATIONS`] with six joints.
-const DRAWS: usize = 1 << 17;
-
 /// Most grid points of which an interpolation is formed as a whole (1): some 50 MB.
 const WHOLE: usize = 1 << 18;
 
 /// Most grid points around a configuration of which an interpolation is formed (1): some milliseconds of time.
 const AROUND: usize = 1 << 10;
 
-/// Grid points that a thread looks through at a time (1): larger leaves threads without, smaller takes memory.
+/// Grid points that all threads look through at a time (1): larger takes memory, smaller shares out too little.
 const STRETCH: usize = 1 << 12;
 
 /// How far the energy changes along an edge of a cell from what the torques at its ends work, over the work of the rms
@@ -101,7 +93,7 @@ impl ErrorCheck<'_> {
         if count == 0 {
             return Ok(None);
         }
-        let places = places(grid, table, contacts, count, DRAWS);
+        let places = places(grid, table, count);
         let solvers = Solvers::new(self.model, rayon::current_num_threads());
         let solved = solvers.map(&places, |solver, place| {
             if stop.load(Ordering::Relaxed) {
@@ -150,7 +142,7 @@ impl ErrorCheck<'_> {
         if contact.law != ContactLaw::Rest {
             return None;
         }
-        let mut following = self.model.with_contact(ContactSpec { law: ContactLaw::Following, ..contact });
+        let mut following = self.model.with_contact(contact.by(ContactLaw::Following));
         (following.with_tangent, following.with_slip) = (false, false);
         let solvers = Solvers::new(&following, rayon::current_num_threads());
         let solved = solvers.map(&reference.places, |solver, q| solver.solve(q));
@@ -213,91 +205,47 @@ fn interpolated(
     places.par_iter().map(around).collect()
 }
 
-/// Random configurations, evenly spread over the cells with a corner in contact, at most `count` of them, of which
-/// `together` are drawn at a time.
-fn places(grid: &Grid, table: &Table<'_>, contacts: usize, count: usize, together: usize) -> Vec<Place> {
-    let mut random = Random::new(SEED);
-    let (mut places, mut left) = (Vec::new(), (2 * count) << grid.joints());
-    while left > 0 && places.len() < count {
-        let draws = left.min(together);
-        left -= draws;
-        places.extend(drawn(grid, table, contacts, draws, &mut random));
-    }
-    places.truncate(count);
-    places
-}
-
-/// The configurations of so many `draws`.
-///
-/// A corner in contact is drawn, then one of the cells around it, which is taken with a probability of one over its
-/// corners in contact: so each such cell is as likely as any other.
-fn drawn(grid: &Grid, table: &Table<'_>, contacts: usize, draws: usize, random: &mut Random) -> Vec<Place> {
-    struct Draw {
-        rank: usize,
-        side: usize,
-        chance: f64,
-        fractions: JointVector,
-    }
-    let joints = grid.joints();
-    let draws: Vec<Draw> = (0..draws)
-        .map(|_| {
-            let mut whole =
-                |below: usize| ((random.between(0.0, 1.0) * below as f64) as usize).min(below.saturating_sub(1));
-            let (rank, side) = (whole(contacts), whole(1 << joints));
-            let mut fractions = JointVector::zeros(joints);
-            fractions.iter_mut().for_each(|fraction| *fraction = random.between(0.0, 1.0));
-            Draw { rank, side, chance: random.between(0.0, 1.0), fractions }
-        })
-        .collect();
-    let mut by_rank: Vec<usize> = (0..draws.len()).collect();
-    by_rank.sort_by_key(|&draw| draws[draw].rank);
-    let ranks: Vec<usize> = by_rank.iter().map(|&draw| draws[draw].rank).collect();
-    let mut points = vec![None; draws.len()];
-    by_rank.into_iter().zip(of_ranks(grid, table, &ranks)).for_each(|(draw, point)| points[draw] = Some(point));
-    let place = |(draw, point): (&Draw, Option<usize>)| {
-        let mut cell = vec![0; joints];
-        for (a, (axis, line)) in grid.axes.iter().zip(grid.lines(point?)).enumerate() {
-            cell[a] = line.checked_sub(draw.side >> a & 1).filter(|low| low + 1 < axis.count)?;
-        }
-        let in_contact = corners(grid, &cell).filter(|&corner| table.status(corner).is_in_contact()).count();
-        if draw.chance * in_contact as f64 >= 1.0 {
-            return None;
-        }
-        let mut q = JointVector::zeros(joints);
-        for (a, axis) in grid.axes.iter().enumerate() {
-            q[a] = axis.coordinate(cell[a]) + draw.fractions[a] * axis.step;
-        }
-        Some(Place { q, cell })
+/// Random configurations, `count` of them, evenly spread over the cells with a corner in contact: each cell has some
+/// numbers that look random and follow from it alone, and the least numbers of all cells are taken.
+fn places(grid: &Grid, table: &Table<'_>, count: usize) -> Vec<Place> {
+    let stretches = || (0..grid.points()).step_by(STRETCH);
+    let cells = |first: usize| {
+        let stretch = (first..grid.points().min(first + STRETCH)).into_par_iter();
+        stretch
+            .filter(|&point| table.status(point).is_in_contact())
+            .flat_map_iter(|point| own_cells(grid, table, point))
     };
-    draws.iter().zip(points).filter_map(place).collect()
-}
-
-/// The grid points of `ranks`, which ascend, among those in contact, as far as there are so many; on all cores.
-fn of_ranks(grid: &Grid, table: &Table<'_>, ranks: &[usize]) -> Vec<usize> {
-    let stretches: Vec<usize> = (0..grid.points()).step_by(STRETCH).collect();
-    let touching = |first: usize| {
-        let stretch = first..grid.points().min(first + STRETCH);
-        stretch.filter(|&point| table.status(point).is_in_contact())
-    };
-    let counts: Vec<usize> = stretches.par_iter().map(|&first| touching(first).count()).collect();
-    let ends = counts.iter().scan(0, |end, count| {
-        *end += count;
-        Some(*end)
-    });
-    let found =
-        stretches.par_iter().zip(ends.collect::<Vec<_>>()).zip(&counts).flat_map_iter(|((&first, end), count)| {
-            let begin = end - count;
-            let [from, to] = [begin, end].map(|rank| ranks.partition_point(|&other| other < rank));
-            let mut wanted = ranks[from..to].iter().peekable();
-            let mut found = Vec::with_capacity(to - from);
-            for (rank, point) in (begin..).zip(touching(first)).take_while(|_| from < to) {
-                while wanted.next_if(|&&wanted| wanted == rank).is_some() {
-                    found.push(point);
-                }
-            }
-            found
+    let all: usize = stretches().map(|first| cells(first).count()).sum();
+    let (numbers, mut least) = (count.div_ceil(all.max(1)) as u64, BTreeSet::new());
+    for first in stretches() {
+        let limit = least.last().filter(|_| least.len() == count).map_or(u64::MAX, |&(number, _)| number);
+        let numbers = cells(first).flat_map_iter(|cell| {
+            let of_cell = (0..numbers).map(move |number| mix(mix(SEED ^ cell as u64).wrapping_add(number)));
+            of_cell.filter(move |number| *number <= limit).map(move |number| (number, cell))
         });
-    found.collect()
+        least.extend(numbers.collect::<Vec<(u64, usize)>>());
+        while least.len() > count {
+            least.pop_last();
+        }
+    }
+    let place = |(number, cell)| {
+        let (mut random, mut q) = (Random::new(number), grid.configuration(cell));
+        q.iter_mut().zip(&grid.axes).for_each(|(q, axis)| *q += random.between(0.0, 1.0) * axis.step);
+        Place { q, cell: grid.lines(cell)[..grid.joints()].to_vec() }
+    };
+    least.into_iter().map(place).collect()
+}
+
+/// The lowest corners of the cells whose first corner in contact is `point`.
+fn own_cells(grid: &Grid, table: &Table<'_>, point: usize) -> impl Iterator<Item = usize> {
+    let lines = grid.lines(point);
+    let low = move |sides: usize| {
+        let along = |(a, axis): (usize, &Axis)| lines[a].checked_sub(sides >> a & 1).filter(|low| low + 1 < axis.count);
+        grid.axes.iter().enumerate().map(along).collect::<Option<Vec<usize>>>()
+    };
+    let is_own =
+        move |low: &Vec<usize>| corners(grid, low).find(|&corner| table.status(corner).is_in_contact()) == Some(point);
+    (0..1_usize << grid.joints()).filter_map(low).filter(is_own).map(|low| grid.point(low))
 }
 
 /// Corners of the cell whose lowest corner is on the lines `cell`, ascending.
@@ -331,51 +279,41 @@ mod tests {
         contact::Equilibrium,
         dataset::Extras,
         fixtures::grids,
-        sweep::{
-            columns::{Columns, Shape},
-            table::Block,
-        },
+        sweep::tile::{Shape, Tile},
     };
 
     const SHAPE: Shape =
         Shape { joints: 2, surface_nodes: 0, extras: Extras { forces: false, tangent: false, slip: false } };
 
     /// A spring of 2 N m/rad beyond q0 = 0.35, and beside it one of 1 N m/rad.
-    fn columns(grid: &Grid) -> Columns {
-        let mut columns = Columns::default();
+    fn tile(grid: &Grid) -> Tile<'static> {
+        let mut tile = Tile::default();
         for point in 0..grid.points() {
             let q = grid.configuration(point);
             let depth = (q[0] - 0.35).max(0.0);
             let status = if depth > 0.0 { Status::Contact } else { Status::Free };
-            columns.push(
+            tile.push(
                 &Equilibrium {
                     status,
-                    iterations: 1,
-                    residual: 0.0,
                     energy: depth * depth * (1.0 + 0.2 * q[1].sin()),
-                    gap: 0.35 - q[0],
-                    tangent: None,
                     torque: JointVector::from_slice(&[
                         -2.0 * depth * (1.0 + 0.2 * q[1].sin()),
                         -0.2 * depth * depth * q[1].cos(),
                     ]),
-                    forces: Vec::new(),
-                    slip: None,
-                    touches: Vec::new(),
+                    ..Equilibrium::free(0.35 - q[0], 2)
                 },
                 SHAPE,
             );
         }
-        columns
+        tile
     }
 
     #[test]
     fn configurations_are_spread_evenly_over_the_cells_in_contact() {
         let grid = grids::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
-        let columns = columns(&grid);
-        let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
+        let table = Table::new(SHAPE, vec![tile(&grid)]);
         // Lines 4 to 7 of the first axis are in contact: so are cells 3 to 6, three times along the second axis.
-        let places = places(&grid, &table, 16, 1200, DRAWS);
+        let places = places(&grid, &table, 1200);
         assert_eq!(places.len(), 1200);
         let mut counts = [[0; 3]; 4];
         for Place { q, cell } in &places {
@@ -385,15 +323,18 @@ mod tests {
                 "{q:?} in {cell:?}"
             );
         }
-        // Binomial, of mean 100 and standard deviation 9.6.
-        assert!(counts.as_flattened().iter().all(|count| (60..140).contains(count)), "{counts:?}");
-        // The same, however many are drawn at a time.
-        for together in [1, 100, 5000] {
-            let again = super::places(&grid, &table, 16, 1200, together);
-            let alike = |(a, b): (&Place, &Place)| a.q == b.q && a.cell == b.cell;
-            assert!(again.len() == 1200 && again.iter().zip(&places).all(alike), "{together}");
-        }
+        assert_eq!(counts, [[100; 3]; 4]);
         assert_eq!(corners(&grid, &[3, 1]).collect::<Vec<_>>(), [13, 14, 17, 18]);
+        // More cells than configurations: 44 times 39.
+        let grid = grids::grid(&[(0.0, 0.01, 80), (0.0, 0.1, 40)]);
+        let table = Table::new(SHAPE, vec![tile(&grid)]);
+        let places = super::places(&grid, &table, 600);
+        let cells: BTreeSet<&[usize]> = places.iter().map(|place| &place.cell[..]).collect();
+        assert_eq!(cells.len(), 600, "no cell twice");
+        let low = [57, 20];
+        // Hypergeometric, of mean 300 and 308, and standard deviation 10.
+        let counts = [0, 1].map(|a| cells.iter().filter(|cell| cell[a] < low[a]).count());
+        assert!(counts.iter().all(|count| (250..350).contains(count)), "{counts:?}");
     }
 
     /// One joint: the energy of a spring is cut nowhere, however stiff, and where it leaps it is cut in the leap's cell.
@@ -402,17 +343,17 @@ mod tests {
         let grid = grids::grid(&[(0.0, 0.1, 8), (0.0, 0.1, 4)]);
         let norm = EffortNorm::new(["rad", "rad"]);
         let share = |leap: f64| {
-            let mut columns = Columns::default();
+            let mut tile = Tile::default();
             for point in 0..grid.points() {
                 let q = grid.configuration(point);
                 let mut equilibrium = Equilibrium::free(-0.01, 2);
                 equilibrium.status = Status::Contact;
                 equilibrium.energy = 0.5 * q[0] * q[0] + if q[0] > 0.25 { leap } else { 0.0 };
                 equilibrium.torque = JointVector::from_slice(&[-q[0], 0.0]);
-                columns.push(&equilibrium, SHAPE);
+                tile.push(&equilibrium, SHAPE);
             }
-            let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
-            let places = places(&grid, &table, 32, 700, DRAWS);
+            let table = Table::new(SHAPE, vec![tile]);
+            let places = places(&grid, &table, 700);
             let mut equilibrium = Equilibrium::free(0.0, 2);
             equilibrium.torque[0] = 0.5;
             let reference = Reference::of(norm, [(places[0].q, equilibrium)]);
@@ -420,16 +361,15 @@ mod tests {
         };
         // A tenth of the work of the rms torque, 0.5 N m over 0.1 rad, is 5 mJ.
         assert_eq!([share(0.0), share(0.0049)], [0.0; 2]);
-        // The cells from 0.2 to 0.3 are a seventh of all; binomial, of standard deviation 0.013.
-        assert!((share(0.0051) - 1.0 / 7.0).abs() < 0.06, "{}", share(0.0051));
+        // The cells from 0.2 to 0.3 are a seventh of all, and each has as many configurations, but for one.
+        assert!((share(0.0051) - 1.0 / 7.0).abs() < 0.01, "{}", share(0.0051));
     }
 
     #[test]
     fn a_window_around_a_configuration_gives_what_the_whole_grid_gives() {
         let grid = grids::grid(&[(0.0, 0.01, 90), (0.0, 0.02, 80)]);
-        let columns = columns(&grid);
-        let table = Table::new(SHAPE, vec![Block::of(&columns, 0)]);
-        let places = places(&grid, &table, 54 * 80, 50, DRAWS);
+        let table = Table::new(SHAPE, vec![tile(&grid)]);
+        let places = places(&grid, &table, 50);
         let places: Vec<&Place> = places.iter().collect();
         let slope = JointVector::from_slice(&[1e3, 1e3]);
         for interpolation in Interpolation::ALL {

@@ -1,6 +1,6 @@
 //! The shards of a sweep, read, compared, and put together into the dataset that one bake would have made.
 //!
-//! Blocks of points are copied in the order of the grid into the part of the output, which then lacks nothing: what
+//! Tiles are copied in the order of the grid into the part of the output, which then lacks nothing: what
 //! follows (the lowest equilibria, the error, the file) is what a bake does that is continued after its last point. So
 //! the dataset has the same bits.
 
@@ -12,7 +12,7 @@ use super::{
     grid_sweep::Sweep,
     part::{Binding, Found, Part},
     shard::{EXTENSION, ranges},
-    table::Block,
+    tile::Tile,
 };
 use crate::{Error, ErrorKind, JointVector, contact::Equilibrium, error, input, proxy::Chain, scene::Scene};
 use memmap2::Mmap;
@@ -45,11 +45,6 @@ impl Contents {
         Ok(Self { path: path.into(), found, map })
     }
 
-    /// Everything on which its results depend.
-    fn binding(&self) -> &Binding {
-        &self.found.binding
-    }
-
     /// Whether all points of the shard are there, and nothing is damaged.
     fn is_whole(&self) -> bool {
         self.found.is_whole(&self.map)
@@ -57,7 +52,7 @@ impl Contents {
 
     /// Whether this is the whole shard that `binding` is of.
     pub fn is_whole_of(&self, binding: &Binding) -> Result<bool, Error> {
-        let its = self.binding();
+        let its = &self.found.binding;
         let different = binding.other_sweep(its).or((binding.shard != its.shard).then_some("another shard"));
         match different {
             Some(difference) => Err(other_part(&self.path, difference)),
@@ -93,24 +88,24 @@ impl Merge {
     pub fn gather(paths: &[PathBuf]) -> Result<Self, Error> {
         let (mut shards, mut notes, mut first) = (BTreeMap::<usize, Contents>::new(), Vec::new(), None);
         for file in files(paths)? {
-            let found = Contents::read(&file).map_err(|reason| {
+            let shard = Contents::read(&file).map_err(|reason| {
                 let remedy = "leave it out, or solve it again with `haptize bake --shard`";
                 Error::at(&file, format_args!("is not a shard: {reason}; {remedy}"))
             })?;
-            let (path, binding) = first.get_or_insert_with(|| (file.clone(), found.binding().clone()));
-            let is_other = binding.shard.count != found.binding().shard.count;
+            let (path, binding) = first.get_or_insert_with(|| (file.clone(), shard.found.binding.clone()));
+            let is_other = binding.shard.count != shard.found.binding.shard.count;
             if let Some(difference) =
-                binding.other_sweep(found.binding()).or(is_other.then_some("another number of shards"))
+                binding.other_sweep(&shard.found.binding).or(is_other.then_some("another number of shards"))
             {
                 return Err(different(&file, path, difference));
             }
-            let Shard { index, .. } = found.binding().shard;
-            if !found.is_whole() {
+            let Shard { index, .. } = shard.found.binding.shard;
+            if !shard.is_whole() {
                 notes.push(format!("{} is damaged: shard {index} counts as missing", file.display()));
             } else if let Some(kept) = shards.get(&index) {
                 notes.push(format!("shard {index} is there twice: {} is taken", kept.path.display()));
             } else {
-                shards.insert(index, found);
+                shards.insert(index, shard);
             }
         }
         let Some((_, binding)) = first else {
@@ -158,15 +153,15 @@ impl Merge {
         let Some(first) = self.shards.values().next().filter(|_| missing.is_empty()) else {
             return Err(self.lacks(&missing));
         };
-        let mut binding = first.binding().clone();
-        let dates = self.shards.values().map(|shard| shard.binding().provenance.date.clone());
+        let mut binding = first.found.binding.clone();
+        let dates = self.shards.values().map(|shard| shard.found.binding.provenance.date.clone());
         binding.provenance.date = dates.min().unwrap_or_default();
         let scene = Scene::of_dataset(&binding.scene, &binding.scene_path, &binding.provenance.algorithm)?;
         let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
         let model = model_of(&scene, &object, &chain)?;
         let by = [&binding.provenance.backend, &binding.provenance.adapter, &binding.provenance.date];
         let sweep = sweep_of(&scene, &object, &model, by.map(String::as_str), measured)?;
-        if let Some(difference) = sweep.binding().other_sweep(&binding) {
+        if let Some(difference) = sweep.binding.other_sweep(&binding) {
             return Err(different(&first.path, &scene.path, difference));
         }
         self.copy(&sweep, output)?;
@@ -181,20 +176,19 @@ impl Merge {
     /// Copies what a part of `output` lacks into it.
     fn copy(&self, sweep: &Sweep<'_>, output: &Path) -> Result<(), Error> {
         let path = Sweep::part_of(output);
-        let mut binding = sweep.binding();
+        let mut binding = sweep.binding.clone();
         let (mut part, tally) = Part::open(&path, true, &mut binding)?;
-        let mut blocks: Vec<Block<'_>> =
-            self.shards.values().flat_map(|shard| shard.found.blocks(&shard.map)).collect();
-        blocks.sort_unstable_by_key(|block| block.first);
-        let begin = blocks.partition_point(|block| block.first < tally.points);
-        let next = blocks.get(begin).map_or(binding.points(), |block| block.first);
+        let mut tiles: Vec<Tile<'_>> = self.shards.values().flat_map(|shard| shard.found.tiles(&shard.map)).collect();
+        tiles.sort_unstable_by_key(|tile| tile.first);
+        let begin = tiles.partition_point(|tile| tile.first < tally.points);
+        let next = tiles.get(begin).map_or(binding.points(), |tile| tile.first);
         if next != tally.points {
             let what = "holds what an unfinished bake or a merge of other shards has left; delete it, or choose another \
                         output";
             return Err(Error::at(&path, what));
         }
-        for block in &blocks[begin..] {
-            part.append(block)?;
+        for tile in &tiles[begin..] {
+            part.append(tile)?;
         }
         for notice in self.notices().get(binding.provenance.notices.len()..).unwrap_or_default() {
             part.note(notice)?;
@@ -207,7 +201,7 @@ impl Merge {
     fn notices(&self) -> Vec<String> {
         let mut solved_by = BTreeMap::<_, Vec<usize>>::new();
         for (&index, shard) in &self.shards {
-            let by = &shard.binding().provenance;
+            let by = &shard.found.binding.provenance;
             solved_by.entry((&by.backend, &by.adapter)).or_default().push(index);
         }
         let others =

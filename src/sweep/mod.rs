@@ -5,7 +5,6 @@ mod bake;
 mod choice;
 mod chunks;
 mod clearance;
-mod columns;
 mod cpu;
 mod direct;
 mod error;
@@ -33,6 +32,7 @@ pub(crate) mod spacing;
 mod table;
 mod tally;
 pub(crate) mod thin_parts;
+mod tile;
 
 pub use crate::contact::Backend;
 pub use bake::{Bake, baked, build_object, sample};

@@ -16,10 +16,10 @@
 //! than some cells of the base, or not found, w is `-sqrt(kc) g`, that of one contact spring; where it is farther by a
 //! bound of the proxy's motion, without slopes.
 
-use super::table::PointResult;
+use super::tile::PointResult;
 use crate::{
     JointVector,
-    contact::{Backend, Equilibrium, Model, Solver, Solvers, Status, Work},
+    contact::{Backend, Equilibrium, Model, Solver, Solvers, Status},
     field::{GRADIENT_STEP, LEAST_ENERGY},
     joint_matrix,
     store::{
@@ -92,78 +92,26 @@ pub(super) fn holding(solver: &mut Solver<'_>, q: &JointVector, here: &Equilibri
 }
 
 /// Solves the nodes at `configurations` together: contact by `backend`, the searches for the
-/// boundary by `solvers`. Returns each with its equilibrium, without touches. `batch` is a good number of
-/// configurations for one call of the backend; `note` takes its notices, each with the number of the first node for
-/// which it holds.
+/// boundary by `solvers`. Returns each with its equilibrium.
 ///
 /// # Errors
 /// When the backend fails.
 pub(super) fn solve_all<B: Backend>(
     backend: &mut B,
-    batch: usize,
     solvers: &Solvers<'_>,
     configurations: &[JointVector],
     scale: &Scale,
-    note: &mut dyn FnMut(usize, String),
 ) -> Result<Vec<(Solved, Equilibrium)>, B::Error> {
-    let nodes: Vec<(usize, JointVector)> = configurations.iter().copied().enumerate().collect();
-    let here = Batches::solve(backend, batch, &nodes, note)?;
+    let here = backend.solve(configurations)?;
     let held: Vec<(&JointVector, &Equilibrium)> = configurations.iter().zip(&here).collect();
     let begun = solvers.map(&held, |solver, (q, here)| begin(solver, q, here, scale));
-    let behind: Vec<(usize, JointVector)> =
-        begun.iter().enumerate().filter_map(|(node, begun)| Some((node, begun.behind?))).collect();
-    let mut beyond = Batches::solve(backend, batch, &behind, note)?.into_iter();
+    let behind: Vec<JointVector> = begun.iter().filter_map(|begun| begun.behind).collect();
+    let mut beyond = backend.solve(&behind)?.into_iter();
     let solved = begun.into_iter().zip(configurations.iter().zip(here)).map(|(begun, (q, here))| {
         let beyond = begun.behind.and_then(|_| beyond.next());
         (begun.conclude(q, &here, beyond.as_ref(), scale), here)
     });
     Ok(solved.collect())
-}
-
-/// Configurations of nodes on their way through a backend, and their equilibria.
-struct Batches<'a> {
-    /// Number of a node, and a configuration of it.
-    all: &'a [(usize, JointVector)],
-    /// How many the backend is given at a time, and how many it was given.
-    batch: usize,
-    given: usize,
-    solved: Vec<Equilibrium>,
-    note: &'a mut dyn FnMut(usize, String),
-}
-
-impl<'a> Batches<'a> {
-    fn solve<B: Backend>(
-        backend: &mut B,
-        batch: usize,
-        all: &'a [(usize, JointVector)],
-        note: &'a mut dyn FnMut(usize, String),
-    ) -> Result<Vec<Equilibrium>, B::Error> {
-        let mut work = Self { all, batch, given: 0, solved: Vec::with_capacity(all.len()), note };
-        backend.stream(&mut work)?;
-        Ok(work.solved)
-    }
-}
-
-impl Work for Batches<'_> {
-    fn next(&mut self) -> Option<Vec<JointVector>> {
-        let batch = self.all[self.given..].chunks(self.batch.max(1)).next()?;
-        self.given += batch.len();
-        Some(batch.iter().map(|(_, q)| *q).collect())
-    }
-
-    fn rewind(&mut self) {
-        self.given = self.solved.len();
-    }
-
-    fn take(&mut self, equilibria: Vec<Equilibrium>) {
-        // Touches take the most memory, and no node needs them.
-        self.solved.extend(equilibria.into_iter().map(|here| Equilibrium { touches: Vec::new(), ..here }));
-    }
-
-    fn note(&mut self, notice: String) {
-        let first = self.all.get(self.solved.len()).or(self.all.last());
-        (self.note)(first.map_or(0, |(node, _)| *node), notice);
-    }
 }
 
 /// A node whose equilibrium is solved.

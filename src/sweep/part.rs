@@ -4,18 +4,18 @@
 //! "haptize part 7\n", then frames:  u64 length of the body, u32 CRC-32 of the body, body
 //! ```
 //!
-//! The first body is the [`Binding`] as JSON, every other one a [`Block`] of results, or [`NOTICE`] and a text. Frames
+//! The first body is the [`Binding`] as JSON, every other one a [`Tile`] of results, or [`NOTICE`] and a text. Frames
 //! are only ever appended. What a crash leaves at the end (half a frame, or a wrong checksum) is cut off and computed
 //! again: a part never adds a wrong number to a dataset, and the finished file is the same, bit for bit, as without the
 //! interruption.
 
 use super::{
     Shard,
-    columns::Shape,
     error::{busy, foreign, in_part, other_part, unwritable},
     shard,
-    table::{Block, Table},
+    table::Table,
     tally::Tally,
+    tile::{Shape, Tile},
 };
 use crate::{
     Error,
@@ -31,7 +31,7 @@ use std::{
 };
 
 const MAGIC: &[u8] = b"haptize part 7\n";
-/// How the body of a notice begins: as no block of columns does, whose first point has no such number.
+/// How the body of a notice begins: as no tile does, whose first point has no such number.
 const NOTICE: [u8; 8] = [u8::MAX; 8];
 
 /// Everything that a sweep's numbers depend on: a part may only be continued by the sweep that began it.
@@ -105,8 +105,8 @@ pub(super) struct Part {
 /// What the bytes of a part hold, as far as they are whole.
 pub(super) struct Found {
     pub binding: Binding,
-    /// Where the blocks of results lie, in the order of the points (bytes).
-    blocks: Vec<Range<usize>>,
+    /// Where the tiles lie, in the order of the points (bytes).
+    tiles: Vec<Range<usize>>,
     pub notices: Vec<String>,
     pub tally: Tally,
     /// Where the frame behind the binding begins, and where the last whole frame ends (bytes).
@@ -126,13 +126,13 @@ impl Found {
             };
         }
         let Some(body) = frame(bytes, MAGIC.len()) else { return Ok(None) };
-        let (results, blocks) = (body.end, Vec::new());
+        let (results, tiles) = (body.end, Vec::new());
         let binding: Binding = serde_json::from_slice(&bytes[body]).map_err(|error| error.to_string())?;
         binding.grid.check()?;
         binding.shard.check()?;
         let (points, shape) = (binding.grid.points(), binding.shape);
         let (notices, tally) = (Vec::new(), Tally::default());
-        let mut found = Self { binding, blocks, notices, tally, results, end: results };
+        let mut found = Self { binding, tiles, notices, tally, results, end: results };
         while let Some(body) = frame(bytes, found.end) {
             let contents = &bytes[body.clone()];
             found.end = if let Some(notice) = contents.strip_prefix(&NOTICE) {
@@ -140,20 +140,20 @@ impl Found {
                 body.end
             } else {
                 let next = found.binding.shard.rest(points, found.tally.points);
-                let is_next = |block: &Block<'_>| block.first == next.start && block.points() <= next.len();
-                let Some(block) = Block::read(contents, shape).filter(is_next) else { break };
-                found.tally.add(&block);
-                found.blocks.push(body.clone());
+                let is_next = |tile: &Tile<'_>| tile.first == next.start && tile.points() <= next.len();
+                let Some(tile) = Tile::read(contents, shape).filter(is_next) else { break };
+                found.tally.add(&tile, 0..tile.points());
+                found.tiles.push(body.clone());
                 body.end
             };
         }
         Ok(Some(found))
     }
 
-    /// The blocks of results in `bytes`, from which this was read.
-    pub fn blocks<'m>(&self, bytes: &'m [u8]) -> impl Iterator<Item = Block<'m>> {
+    /// The tiles in `bytes`, from which this was read.
+    pub fn tiles<'m>(&self, bytes: &'m [u8]) -> impl Iterator<Item = Tile<'m>> {
         let shape = self.binding.shape;
-        self.blocks.iter().filter_map(move |body| Block::read(&bytes[body.clone()], shape))
+        self.tiles.iter().filter_map(move |body| Tile::read(&bytes[body.clone()], shape))
     }
 
     /// Whether all points are there, and nothing of `bytes` is damaged.
@@ -227,10 +227,9 @@ impl Part {
     }
 
     /// Adds the results of the next points.
-    pub fn append(&mut self, block: &Block<'_>) -> Result<(), Error> {
-        let opening = block.opening();
-        let mut body = vec![&opening[..]];
-        body.extend(block.columns);
+    pub fn append(&mut self, tile: &Tile<'_>) -> Result<(), Error> {
+        let (opening, columns) = tile.bytes();
+        let body: Vec<&[u8]> = std::iter::once(&opening[..]).chain(columns).collect();
         self.write(&body).map_err(|source| in_part(&self.path, &source))
     }
 
@@ -276,8 +275,8 @@ impl Part {
 
     /// The results in `map`, which is of this part.
     pub fn table<'m>(&self, map: &'m Mmap, shape: Shape) -> Result<Table<'m>, Error> {
-        let blocks = self.found(map)?.map_or_else(Vec::new, |found| found.blocks(map).collect());
-        Ok(Table::new(shape, blocks))
+        let tiles = self.found(map)?.map_or_else(Vec::new, |found| found.tiles(map).collect());
+        Ok(Table::new(shape, tiles))
     }
 }
 

@@ -58,14 +58,14 @@ impl Plan {
         let start = Instant::now();
         let bake = Bake { scene, backend, measured: Some(0), aim: None, date: "", stop, progress: &mut |_| () };
         bake.prepared(|sweep, backend, run| {
-            sweep.shard = Shard { index: 0, count };
+            sweep.binding.shard = Shard { index: 0, count };
             let solved = sweep.solved_of_shards(count)?;
             let setup = start.elapsed().as_secs_f64();
-            sweep.shard = Shard::WHOLE;
+            sweep.binding.shard = Shard::WHOLE;
             // A GPU's time for few points says nothing of many.
             let is_timed = backend.is_cpu_alone();
             let forecast = sweep.forecast.map_or_else(|| sweep.sampled(backend, is_timed), Ok)?;
-            sweep.shard = Shard { index: 0, count };
+            sweep.binding.shard = Shard { index: 0, count };
             let largest = sweep.footprint(run.chunk, false);
             let (points, all) = (sweep.grid().points(), solved.iter().sum::<usize>());
             let cost = |(index, &solved): (usize, &usize)| {

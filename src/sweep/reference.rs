@@ -1,6 +1,6 @@
 //! Directly solved configurations, each solved once, and the distance of other answers from them.
 
-use super::{Backend, CpuBackend, table::PointResult};
+use super::{Backend, CpuBackend, tile::PointResult};
 use crate::{
     Error, JointVector,
     contact::{Equilibrium, Model, Slip, Solvers, Status, exact_dissipation},

@@ -2,7 +2,7 @@
 
 use super::{
     Backend, Run, Shard, Sweep, SweepReport,
-    chunks::Begun,
+    chunks::Store,
     error::{foreign, unwritable},
     merge::Contents,
     part::Part,
@@ -16,7 +16,7 @@ use std::{
 impl Sweep<'_> {
     /// Number of points that are not skipped, of each of `count` shards.
     pub(super) fn solved_of_shards(&self, count: usize) -> Result<Vec<usize>, Error> {
-        let (points, any) = (self.grid.points(), Shard { index: 0, count });
+        let (points, any) = (self.binding.grid.points(), Shard { index: 0, count });
         let (mut solved, mut done) = (vec![0; count], 0);
         let free_space = self.free_space();
         while done < points {
@@ -42,8 +42,8 @@ impl Sweep<'_> {
         shard: Shard,
         mut run: Run<'_>,
     ) -> Result<(PathBuf, Option<SweepReport>), Error> {
-        self.shard = shard;
-        let mut binding = self.binding();
+        self.binding.shard = shard;
+        let mut binding = self.binding.clone();
         let failed = |source| unwritable(folder, &source);
         fs::create_dir_all(folder).map_err(failed)?;
         let file = folder.join(binding.file_name());
@@ -63,9 +63,7 @@ impl Sweep<'_> {
             let _ = fs::remove_file(&part_path);
             return Ok((file, None));
         }
-        let footprint = self.footprint(run.chunk, false);
-        let begun = Begun { tally, provenance: binding.provenance };
-        let solved = self.solve(backend, &mut run, begun, footprint, &mut part)?;
+        let solved = self.solve(backend, &mut run, (tally, binding.provenance), Store::Part(&mut part))?;
         part.finish(&file)?;
         Ok((file, Some(self.report(solved).0)))
     }

@@ -11,12 +11,14 @@ mod modulus;
 mod nets;
 mod onset;
 mod radial;
+mod range;
 mod shape;
 
-pub use draft::twin_scene;
+pub use draft::{Given, twin_scene};
 pub use modulus::{Modulus, Watched};
 pub use onset::{Approaches, Onset};
 pub use radial::RadialField;
+pub use range::KnownRange;
 pub use shape::{Carving, OBJ, ScannedShape, Touched};
 
 #[cfg(test)]

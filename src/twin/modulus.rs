@@ -58,6 +58,8 @@ pub struct Modulus {
     pub rows: usize,
     /// See `rows`.
     pub counted: usize,
+    /// Greatest depth of those that count below the surface that was touched (m).
+    pub deepest: f64,
     /// Apparent modulus of each approach, by its number (Pa).
     #[serde(skip)]
     pub apparent: BTreeMap<usize, f64>,
@@ -123,6 +125,10 @@ impl Modulus {
                 found.deviation = OF_MEDIAN * median(&spread).unwrap_or(0.0) / (steps.len() as f64).sqrt();
                 found.misfit = f64::sqrt(left / numbers);
                 found.torque = f64::sqrt(all / numbers);
+                let mut pose = model.chain.new_pose();
+                let counted = rows.iter().zip(&explained).filter(|(_, explained)| explained.is_some());
+                let depths = counted.map(|(row, _)| shape.depth(&row.q, model.chain, &mut pose));
+                found.deepest = depths.fold(0.0, f64::max);
                 let apparent = sums.keys().zip(steps).map(|(line, step)| (*line, found.young * (1.0 + step).max(0.0)));
                 found.apparent = apparent.collect();
                 return Ok(found);

@@ -181,6 +181,15 @@ impl ScannedShape {
         (known().map(|deviation| deviation * deviation).sum::<f64>() / known().count().max(1) as f64).sqrt()
     }
 
+    /// Returns how deep the nodes of `chain` at `q` are below the surface that was touched, or its continuation: negative
+    /// where none is (m). `pose` is overwritten.
+    #[must_use]
+    pub fn depth(&self, q: &[f64], chain: &Chain, pose: &mut Pose) -> f64 {
+        chain.pose(q, pose);
+        let depths = pose.nodes.iter().zip(&chain.nodes).map(|(x, node)| node.radius - self.field.value(*x));
+        depths.fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// The surface of the body, and how well it is known. `scale`: see [`fit`].
     fn mesh(&mut self, scale: f64) {
         let low = self.touched.iter().map(|touched| touched.place).fold(DVec3::INFINITY, DVec3::min);

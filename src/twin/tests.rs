@@ -1,7 +1,7 @@
 //! Bodies of the scene's own kinds, scanned by a rig that is computed configuration by configuration: encoder steps,
 //! actuator noise, dry friction of the joints, friction on the surface. The truth has a mesh of its own.
 
-use super::{Approaches, Modulus, ScannedShape, Watched, twin_scene};
+use super::{Approaches, Given, KnownRange, Modulus, ScannedShape, Watched, twin_scene};
 use crate::{
     JointVector,
     contact::{Model, Solver, geometry::RestSurface},
@@ -262,7 +262,8 @@ fn with_twin<T>(
     let [file, path] = ["twin.obj", "twin.toml"].map(|name| folder.path().join(name));
     std::fs::write(&file, shape.obj()).unwrap();
     let mesh = (file.as_path(), "twin.obj");
-    let twin = twin_scene((&scene.text, &path), mesh, (&shape, &approaches), START, Some(width)).unwrap();
+    let (range, given) = (KnownRange::around(&approaches), Given { width: Some(width), cell: None });
+    let twin = twin_scene((&scene.text, &path), mesh, (&shape, &range), START, given).unwrap();
     let object = Object::build(&twin.object).unwrap();
     let mut model = Model::new(&object, chain, twin.contact);
     let watched = &mut Watched { stop: &AtomicBool::new(false), progress: &mut |_, _| () };
@@ -389,6 +390,36 @@ below = -0.0299",
         assert!(off < shape.spacing && contrast > 1.03, "{off} {contrast}");
     });
 }
+
+/// The ground clamps the underside of a twin, to which contact goes past the middle.
+#[test]
+fn the_grid_of_a_twin_is_no_deeper_than_the_rows_that_count_and_its_torque_as_bounded() {
+    let scanned = Specimen { nodes: TIP, plan: DEEP, ..SLAB }.scan(5, (&[], 0.0));
+    let Scanned { log, scene, chain, .. } = &scanned;
+    let approaches = Approaches::new(log, scene, chain).unwrap();
+    let around = KnownRange::around(&approaches);
+    with_twin(&scanned, [-0.03, 0.02], |shape, modulus, solver| {
+        let range = around.no_deeper(modulus.deepest, shape, chain);
+        assert!(modulus.counted < modulus.rows && modulus.deepest < 0.03, "{modulus:?}");
+        let held = |range: &KnownRange, solver: &mut Solver<'_>| {
+            let forces: Vec<f64> = range.grid().iter().map(|q| solver.solve(q).torque.norm()).collect();
+            forces.into_iter().fold(0.0, f64::max) * modulus.young / START
+        };
+        let [whole, within] = [&around, &range].map(|range| held(range, solver));
+        println!("torque over the whole box {whole:.3}, within {within:.3} N m; {range:?}");
+        assert!(within > 0.0 && whole > 1e3 * within);
+    });
+}
+
+/// Through the slab, almost.
+const DEEP: &str = "node = 0
+start = [0.124, -0.027, 0.012]
+across = [
+    { direction = [0.0, 1.0, 0.0], spacing = 0.006, count = 10 },
+    { direction = [1.0, 0.0, 0.0], spacing = 0.006, count = 13 },
+]
+depth = { direction = [0.0, 0.0, -1.0], spacing = 0.004, count = 9 }
+clearance = 0.004";
 
 #[test]
 fn a_ball_is_found_to_a_tenth_of_the_spacing() {

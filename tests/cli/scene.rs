@@ -338,6 +338,13 @@ const BROKEN: &[Broken] = &[
     ("stiffness = 1000", "", "[contact]", &["no stiffness", "stiffness_per_length"]),
     ("stiffness = 1000", "stiffness_per_length = 1e5", "per_length = 1e5", &["{ at = .. }", "of each node instead"]),
     ("stiffness = 1000", "stiffness = \"rigid\"\nstiffness_per_length = 1e5", "rigid", &["leave out one"]),
+    ("stiffness = 1000", "stiffness = 1000\nround = 0", "round = 0", &["positive"]),
+    (
+        "stiffness = 1000",
+        "stiffness = 1000\nlaw = \"following\"\nround = 0.01",
+        "round",
+        &["at rest", "leave round out"],
+    ),
     ("stiffness = 1000", "stiffness = 1000\nstiffness_per_length = 0", "per_length = 0", &["positive"]),
     ("stiffness = 1000", "stiffness = 1,000", "1,000", &[]),
     ("stiffness = 1000", "stiffness = 1000\nstiffness = 2", "stiffness = 2", &["duplicate key"]),

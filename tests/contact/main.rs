@@ -19,3 +19,4 @@ mod oracle;
 mod paper;
 mod refinement;
 mod rest;
+mod rounded;

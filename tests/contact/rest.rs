@@ -17,7 +17,7 @@ use haptize::scene::{
 use haptize::sweep::CpuBackend;
 
 /// Contact at rest of stiffness kc at a contact point (N/m).
-fn contact(kc: f64) -> ContactSpec {
+pub fn contact(kc: f64) -> ContactSpec {
     ContactSpec { surface: ContactSurface::Smooth, ..crate::fixture::contact(ContactLaw::Rest, kc / 3.0) }
 }
 
@@ -88,16 +88,16 @@ const STEP: f64 = 1e-6;
 /// The largest difference between the torque and minus the central difference of the energy, over the largest entry of
 /// the torque, where contacts neither come nor go nor change facets: there U has no third derivative. None where that
 /// is so along no joint.
-fn gradient_error(solver: &mut Solver<'_>, q: &[f64], here: &Equilibrium) -> Option<f64> {
+pub fn gradient_error(solver: &mut Solver<'_>, q: &[f64], here: &Equilibrium, step: f64) -> Option<f64> {
     let mut worst: Option<f64> = None;
     for joint in 0..q.len() {
-        let [before, after] = [-STEP, STEP].map(|step| {
+        let [before, after] = [-step, step].map(|step| {
             let mut moved = q.to_vec();
             moved[joint] += step;
             solver.solve(&moved)
         });
         if touched(&before) == touched(here) && touched(&after) == touched(here) {
-            let slope = (before.energy - after.energy) / (2.0 * STEP);
+            let slope = (before.energy - after.energy) / (2.0 * step);
             worst = Some(worst.unwrap_or(0.0).max((slope - here.torque[joint]).abs()));
         }
     }
@@ -118,7 +118,7 @@ fn the_torque_is_the_gradient_of_the_energy() {
                     continue;
                 }
                 assert_eq!(here.status, Status::Contact, "{name}, {kc} N/m, {q:?}");
-                if let Some(error) = gradient_error(&mut solver, q, &here) {
+                if let Some(error) = gradient_error(&mut solver, q, &here, STEP) {
                     worst = worst.max(error);
                     checked += 1;
                 }
@@ -133,13 +133,13 @@ fn the_torque_is_the_gradient_of_the_energy() {
 
 /// The greatest difference between the tangent and the central differences of the torque, over the tangent's greatest
 /// entry, where contacts neither come nor go nor change facets. None where that is so along no joint.
-fn tangent_error(solver: &mut Solver<'_>, q: &[f64], here: &Equilibrium) -> Option<f64> {
+pub fn tangent_error(solver: &mut Solver<'_>, q: &[f64], here: &Equilibrium, step: f64) -> Option<f64> {
     let tangent = here.tangent.unwrap();
     let entries = lower(&tangent, q.len());
     let size = entries.fold(0.0_f64, |size, entry| size.max(entry.abs()));
     let mut worst: Option<f64> = None;
     for l in 0..q.len() {
-        let [before, after] = [-STEP, STEP].map(|step| {
+        let [before, after] = [-step, step].map(|step| {
             let mut moved = q.to_vec();
             moved[l] += step;
             solver.solve(&moved)
@@ -147,7 +147,7 @@ fn tangent_error(solver: &mut Solver<'_>, q: &[f64], here: &Equilibrium) -> Opti
         if touched(&before) == touched(here) && touched(&after) == touched(here) {
             for (k, row) in tangent.iter().enumerate().take(q.len()) {
                 assert_eq!(row[l], tangent[l][k]);
-                let slope = (after.torque[k] - before.torque[k]) / (2.0 * STEP);
+                let slope = (after.torque[k] - before.torque[k]) / (2.0 * step);
                 worst = Some(worst.unwrap_or(0.0).max((slope - row[l]).abs() / size));
             }
         }
@@ -167,7 +167,7 @@ fn the_tangent_is_the_derivative_of_the_torque() {
             for q in &places {
                 let here = solver.solve(q);
                 if here.status == Status::Contact
-                    && let Some(error) = tangent_error(&mut solver, q, &here)
+                    && let Some(error) = tangent_error(&mut solver, q, &here, STEP)
                 {
                     worst = worst.max(error);
                     checked += 1;
@@ -339,7 +339,7 @@ fn the_sideways_part_of_the_force_is_needed() {
         let node = here.touches[0].proxy_node as usize;
         let normal: glam::DVec3 = here.forces.iter().map(|force| -force.force).sum();
         chain.add_torque(solver.pose(), node, normal, &mut here.torque);
-        worst = worst.max(gradient_error(&mut solver, &q, &here).unwrap_or(0.0));
+        worst = worst.max(gradient_error(&mut solver, &q, &here, STEP).unwrap_or(0.0));
     }
     assert!(worst > 1e-3, "{worst}");
 }
@@ -349,7 +349,7 @@ const PARTS: usize = 800;
 
 /// Work of the torque around a square of three degrees of the last two joints from `q` on, by the trapezoidal rule, with
 /// the greatest energy (J) and depth (m) on the way.
-fn work_around(solver: &mut Solver<'_>, q: &[f64]) -> (f64, f64, f64) {
+pub fn work_around(solver: &mut Solver<'_>, q: &[f64]) -> (f64, f64, f64) {
     let step = 3_f64.to_radians() / PARTS as f64;
     let (mut at, mut sum) = (q.to_vec(), (0.0, 0.0_f64, 0.0_f64));
     for (joint, step) in [(q.len() - 2, step), (q.len() - 1, step), (q.len() - 2, -step), (q.len() - 1, -step)] {

@@ -153,7 +153,8 @@ fn ball(cell: f64, inclusions: Vec<InclusionSpec>) -> Result<Object, Error> {
 
 #[test]
 fn an_inclusion_like_the_rest_changes_nothing() {
-    let same = sphere(DVec3::new(0.01, 0.0, 0.02), 0.02, YOUNG, 0.3);
+    // Large enough for the cubes that it cuts.
+    let same = sphere(DVec3::new(0.002, 0.0, 0.003), 0.04, YOUNG, 0.3);
     let (plain, same) = (ball(0.02, vec![]).unwrap(), ball(0.02, vec![same]).unwrap());
     let scale = plain.mechanics().unwrap().stiffness.norm();
     for (a, b) in plain.mechanics().unwrap().stiffness.blocks.iter().zip(&same.mechanics().unwrap().stiffness.blocks) {
@@ -204,7 +205,7 @@ fn a_composite_sphere_has_hashins_bulk_modulus() {
 
 #[test]
 fn the_last_of_overlapping_inclusions_counts() {
-    let ball = |inclusions: Vec<InclusionSpec>| ball(0.02, inclusions);
+    let ball = |inclusions: Vec<InclusionSpec>| ball(0.018, inclusions);
     // The elements about the middle end within the core.
     let (stiff, core) = (sphere(DVec3::ZERO, 0.045, 1e6, 0.3), sphere(DVec3::ZERO, 0.036, YOUNG, 0.3));
     let (plain, hollow) = (ball(vec![]).unwrap(), ball(vec![stiff, core]).unwrap());
@@ -278,5 +279,27 @@ fn scenes_say_what_an_inclusion_needs() {
     ] {
         let error = scene(&solid(inclusion)).unwrap_err();
         assert!(error.contains(expected) && error.contains("nodule.toml:"), "{inclusion}: {error}");
+    }
+}
+
+/// Cubes that a sphere cuts are halved until they are half of its radius, and a quarter where it comes out of the body;
+/// the others stay as they are.
+#[test]
+fn small_inclusions_are_cut_by_small_cubes() {
+    let nodes = |inclusions| ball(0.02, inclusions).unwrap().mechanics().unwrap().moved.clone();
+    let plain = nodes(vec![]);
+    // Nodes lie half a cube apart.
+    let pitch = |nodes: &[DVec3]| {
+        let mut along: Vec<f64> = nodes.iter().map(|node| node.x).collect();
+        along.sort_by(f64::total_cmp);
+        along.windows(2).map(|two| two[1] - two[0]).filter(|gap| *gap > 1e-9).fold(f64::INFINITY, f64::min)
+    };
+    assert!((pitch(&plain) - 0.01).abs() < 1e-9);
+    for (centre, expected) in [(DVec3::ZERO, 0.0025), (0.048 * DVec3::Z, 0.00125)] {
+        let found = nodes(vec![sphere(centre, 0.01, 1e5, 0.3)]);
+        assert!((pitch(&found) - expected).abs() < 1e-9, "{centre}: {}", pitch(&found));
+        // No cube that far away is cut: its diagonal is 35 mm.
+        let far: Vec<&DVec3> = plain.iter().filter(|x| x.distance(centre) > 0.01 + 0.035).collect();
+        assert!(far.len() > 20 && far.iter().all(|x| found.iter().any(|y| y.distance(**x) < 1e-9)));
     }
 }

@@ -19,7 +19,11 @@
 //!
 //! The surface without contact may stand elsewhere than at rest, displaced by s of an object that remembers
 //! ([`RestProgram::standing`]). Depths are then D_i + g_i . s, and u = s - C G^T lambda.
+//!
+//! Before a rounded surface ([`super::super::law::rounded`]) rows are blends on the points of a lattice ([`blended`]), and
+//! these stand for the nodes of the support; all else is the same.
 
+mod blended;
 mod sensitivity;
 mod tangent;
 
@@ -28,11 +32,13 @@ pub use sensitivity::Sensitivity;
 use crate::contact::detection::Detection;
 use crate::contact::equilibrium::energy::SolverStats;
 use crate::contact::geometry::smooth::CARRIERS;
-use crate::contact::law::depth::Contact;
-use crate::contact::law::springs::{Slots, Springs};
+use crate::contact::law::depth::{Contact, Variation};
+use crate::contact::law::rounded::MOST_SIZE;
+use crate::contact::law::springs::{Slots, Springs, stretched_and_bent};
 use crate::contact::linear::nonnegative::NonnegativeProgram;
 use crate::contact::linear::support::{Support, dot};
 use crate::contact::model::Model;
+use blended::{BlendedRows, TAPS};
 use glam::DVec3;
 
 /// Which rows push, before it is known. The solution is the same but for rounding.
@@ -70,6 +76,8 @@ pub struct RestProgram {
     /// Displacement s of each surface node without contact; empty at rest (m).
     pub standing: Vec<DVec3>,
     limits: RestLimits,
+    /// What the rows hang on before a rounded surface.
+    blended: Option<BlendedRows>,
     slots: Vec<Slots>,
     /// Whether each proxy node that has a row pushes.
     pushes: Vec<Option<bool>>,
@@ -96,6 +104,7 @@ impl RestProgram {
             energy: 0.0,
             standing: Vec::new(),
             limits,
+            blended: BlendedRows::new(model),
             slots: Vec::new(),
             pushes: vec![None; model.chain.nodes.len()],
             displacement: Vec::new(),
@@ -110,13 +119,26 @@ impl RestProgram {
     #[must_use]
     pub fn within(model: &Model, limits: RestLimits) -> Self {
         let rows = limits.rows.min(model.chain.nodes.len());
-        let nodes = limits.nodes.min(CARRIERS * rows).min(model.surface.positions.len());
-        let limits = RestLimits { rows, nodes, ..limits };
-        let mut program = Self { limits, ..Self::new(model) };
-        program.support.reserve(nodes + CARRIERS, model.compliance.rows_per_node);
-        for vector in [&mut program.forces, &mut program.displacement, &mut program.response] {
-            vector.reserve(3 * nodes);
-        }
+        let mut program = Self::new(model);
+        let surface_nodes = model.surface.positions.len();
+        let nodes = match &mut program.blended {
+            None => {
+                let nodes = limits.nodes.min(CARRIERS * rows).min(surface_nodes);
+                program.support.reserve(nodes + CARRIERS, model.compliance.rows_per_node);
+                program.displacement.reserve(3 * nodes);
+                program.response.reserve(3 * nodes);
+                program.forces.reserve(3 * nodes);
+                nodes
+            }
+            Some(blended) => {
+                let points = limits.nodes.min(TAPS * rows);
+                blended.reserve(rows, points);
+                program.support.reserve_nodes(surface_nodes);
+                program.forces.reserve(3 * surface_nodes);
+                points
+            }
+        };
+        program.limits = RestLimits { rows, nodes, ..limits };
         program.rows.reserve(rows);
         program.slots.reserve(rows);
         program.compliance.reserve(rows * rows);
@@ -129,6 +151,7 @@ impl RestProgram {
     pub fn solve(&mut self, model: &Model, detection: &mut Detection, guess: Guess) -> Option<SolverStats> {
         self.support.clear();
         self.rows.clear();
+        self.blended.iter_mut().for_each(BlendedRows::clear);
         self.slots.clear();
         self.depths.clear();
         let mut fits = true;
@@ -137,7 +160,7 @@ impl RestProgram {
             let reach = if pushed == Some(true) { f64::INFINITY } else { 0.0 };
             if fits && let Some(row) = detection.at_rest(model, i, reach) {
                 let pushes = pushed.unwrap_or(row.depth > 0.0);
-                fits = self.add(row, pushes);
+                fits = self.add(row, detection.nodes()[i], pushes);
             }
         }
         let (mut iterations, mut known) = (0, 0);
@@ -165,17 +188,25 @@ impl RestProgram {
         loaded.filter(|(_, force)| **force != [0.0; 3]).map(|(&node, _)| node)
     }
 
-    /// Adds a row whose proxy node `pushes`, by a guess, and returns whether it is within the limits.
-    fn add(&mut self, row: Contact, pushes: bool) -> bool {
-        let depth = self.depth(&row);
-        let Self { support, rows, slots, depths, limits, .. } = self;
+    /// Adds a row whose proxy node, at `x`, `pushes`, by a guess, and returns whether it is within the limits.
+    fn add(&mut self, row: Contact, x: DVec3, pushes: bool) -> bool {
+        let depth = self.depth(&row, x);
+        let Self { support, rows, blended, slots, depths, limits, .. } = self;
         let mut own = [0; CARRIERS];
         for (j, (slot, &node)) in own.iter_mut().zip(row.carriers.nodes()).enumerate() {
             if row.carriers.carries(j) {
                 *slot = support.add(node) as u32;
             }
         }
-        if rows.len() == limits.rows || support.nodes().len() > limits.nodes {
+        let nodes = match blended {
+            None => support.nodes().len(),
+            Some(_) if rows.len() == limits.rows => return false,
+            Some(blended) => {
+                blended.add(x);
+                blended.order()
+            }
+        };
+        if rows.len() == limits.rows || nodes > limits.nodes {
             return false;
         }
         self.pushes[row.proxy_node as usize] = Some(pushes);
@@ -187,14 +218,23 @@ impl RestProgram {
 
     /// Brings the support and the program up to date with the rows, of which the first `known` were there before.
     fn assemble(&mut self, model: &Model, known: usize) {
-        let Self { support, rows, slots, response, compliance, .. } = self;
-        support.gather(&model.compliance);
-        response.resize(support.response_width() * support.nodes().len(), 0.0);
+        let Self { support, rows, blended, slots, response, compliance, .. } = self;
+        match blended {
+            None => {
+                support.gather(&model.compliance);
+                response.resize(support.response_width() * support.nodes().len(), 0.0);
+            }
+            Some(blended) => blended.gather(),
+        }
         let count = rows.len();
         widen(compliance, known, count);
         let springs = Springs { contacts: rows, slots, kc: model.kc };
         for i in known..count {
-            springs.respond(support, (i, 0..=i), response, &mut compliance[i * count..][..=i]);
+            let gives = &mut compliance[i * count..][..=i];
+            match blended {
+                None => springs.respond(support, (i, 0..=i), response, gives),
+                Some(blended) => blended.respond(i, gives),
+            }
             (0..i).for_each(|j| compliance[j * count + i] = compliance[i * count + j]);
             compliance[i * count + i] += 1.0 / (model.kc * rows[i].share);
         }
@@ -202,27 +242,88 @@ impl RestProgram {
 
     /// Takes forces and energies from the program's solution.
     fn take_solution(&mut self, model: &Model) {
-        let Self { support, forces, rows, elastic, energy, slots, pushes, depths, program, .. } = self;
-        forces.clear();
-        forces.resize(support.order(), 0.0);
-        *energy = 0.5 * dot(&program.solution, depths);
+        let Self { rows, blended, elastic, energy, pushes, depths, program, .. } = self;
+        // 2 l . D - l . S l: to first order, what rounding leaves in the forces is not in it.
+        *energy = 0.5 * (dot(&program.solution, depths) + dot(&program.solution, &program.slack));
         *elastic = *energy;
         for (row, &force) in rows.iter_mut().zip(&program.solution) {
             row.multiplier = force;
             pushes[row.proxy_node as usize] = Some(force > 0.0);
             *elastic -= 0.5 * force * force / (model.kc * row.share);
         }
-        let springs = Springs { contacts: rows, slots, kc: model.kc };
-        for (i, &force) in program.solution.iter().enumerate().filter(|(_, force)| **force > 0.0) {
-            springs.add_reaction(i, &rows[i].spread(-force), forces);
+        if let Some(blended) = blended {
+            return blended.take_forces(&program.solution);
+        }
+        let mut forces = std::mem::take(&mut self.forces);
+        forces.clear();
+        forces.resize(self.support.order(), 0.0);
+        (0..self.rows.len()).for_each(|i| self.add_load(i, -self.rows[i].multiplier, &mut forces));
+        self.forces = forces;
+    }
+
+    /// Numbers of a load: of the forces on the support, or along the rows of the points that stand for it.
+    fn order(&self) -> usize {
+        self.blended.as_ref().map_or(self.support.order(), BlendedRows::order)
+    }
+
+    /// Adds `force` times row `i` to `load`.
+    fn add_load(&self, i: usize, force: f64, load: &mut [f64]) {
+        let Self { rows, blended, slots, .. } = self;
+        match blended {
+            _ if force == 0.0 => {}
+            None => Springs { contacts: rows, slots, kc: 1.0 }.add_reaction(i, &rows[i].spread(force), load),
+            Some(blended) => blended.add_load(i, force, load),
+        }
+    }
+
+    /// Adds the change of row `i` times its force, as its proxy node moves by `way` (m), to `load`.
+    fn add_turn(&self, i: usize, way: DVec3, load: &mut [f64]) {
+        let Self { rows, blended, slots, .. } = self;
+        let row = &rows[i];
+        match blended {
+            None => {
+                let turned = stretched_and_bent(row, 0.0, &Variation::translation(-way));
+                Springs { contacts: rows, slots, kc: 1.0 }.add_reaction(i, &turned, load);
+            }
+            Some(blended) => blended.add_turn(i, way * row.multiplier, load),
+        }
+    }
+
+    /// Sets `response` to how the support moves, or its points give, under `load` (m).
+    fn respond(&self, load: &[f64], response: &mut [f64]) {
+        match &self.blended {
+            None => self.support.multiply(load, response),
+            Some(blended) => blended.multiply(load, response),
+        }
+    }
+
+    /// By how much such a `response` deepens row `i` (m).
+    fn depth_change(&self, i: usize, response: &[f64]) -> f64 {
+        let Self { rows, blended, slots, .. } = self;
+        match blended {
+            None => Springs { contacts: rows, slots, kc: 1.0 }.depth_change(i, response),
+            Some(blended) => blended.depth_change(i, response),
         }
     }
 
     /// Sets the displacement of the support under the forces.
     fn displace_support(&mut self) {
-        let Self { support, forces, displacement, .. } = self;
+        let Self { support, forces, displacement, blended, .. } = self;
+        if let Some(blended) = blended {
+            blended.give();
+            blended.put_on(support);
+            return blended.spread(&blended.load, support, forces);
+        }
         displacement.resize(forces.len(), 0.0);
         support.multiply(forces, displacement);
+    }
+
+    /// The object's nodes that carry row `i` and their shares of its force, in sum one.
+    pub fn carriers(&self, i: usize) -> Vec<(u32, f64)> {
+        match &self.blended {
+            None => self.rows[i].carriers.iter().collect(),
+            Some(blended) => blended.carriers(i, &self.support),
+        }
     }
 
     /// Has `detection` take up the displaced surface, and returns a bound of how far that has moved (m).
@@ -235,15 +336,24 @@ impl RestProgram {
     /// Adds a row for each proxy node without one that the displaced surface has reached, and returns whether they are
     /// within the limits.
     fn add_rows(&mut self, model: &Model, detection: &mut Detection) -> bool {
-        let moved = self.displace(model, detection);
+        let moved = match &mut self.blended {
+            None => self.displace(model, detection),
+            Some(blended) => {
+                blended.give();
+                blended.deepening_bound(self.elastic) + MOST_SIZE * self.farthest()
+            }
+        };
         (0..model.chain.nodes.len()).all(|i| {
             if self.pushes[i].is_some() {
                 return true;
             }
-            match detection.at_rest(model, i, moved) {
-                Some(row) if self.depth(&row) + linear_change(model, &row, detection) > 0.0 => self.add(row, true),
-                _ => true,
-            }
+            let Some(row) = detection.at_rest(model, i, moved) else { return true };
+            let x = detection.nodes()[i];
+            let change = match &self.blended {
+                None => linear_change(model, &row, detection),
+                Some(blended) => blended.deepening(x),
+            };
+            self.depth(&row, x) + change <= 0.0 || self.add(row, x, true)
         })
     }
 
@@ -252,25 +362,38 @@ impl RestProgram {
         self.standing.iter().map(|node| node.length_squared()).fold(0.0, f64::max).sqrt()
     }
 
-    /// Depth of `row` before the surface as it stands without contact (m).
-    fn depth(&self, row: &Contact) -> f64 {
+    /// Depth of `row`, of a proxy node at `x`, before the surface as it stands without contact (m).
+    fn depth(&self, row: &Contact, x: DVec3) -> f64 {
         if self.standing.is_empty() {
             return row.depth;
         }
-        let nodes = row.carriers.nodes();
-        row.depth + row.normal.dot(row.moved(|j| self.standing[nodes[j] as usize]))
+        let stands = |node: u32| self.standing[node as usize];
+        match &self.blended {
+            None => row.depth + row.normal.dot(row.moved(|j| stands(row.carriers.nodes()[j]))),
+            Some(blended) => row.depth + blended.standing(x, stands),
+        }
     }
 
     /// Force on the proxy node of row `i`: along the normal, and sideways by how the row changes (N).
     #[must_use]
     pub fn force(&self, i: usize) -> DVec3 {
-        let Self { support, rows, slots, displacement, standing, .. } = self;
-        let (row, nodes) = (&rows[i], displacement.as_chunks::<3>().0);
-        let moved = |slot: usize| {
-            let stands = standing.get(support.nodes()[slot] as usize).copied().unwrap_or_default();
-            DVec3::from_array(nodes[slot]) + stands
+        let Self { support, rows, blended, slots, displacement, .. } = self;
+        let row = &rows[i];
+        let stands = |node: u32| self.stands(node);
+        let pushed = match blended {
+            None => {
+                let nodes = displacement.as_chunks::<3>().0;
+                let moved = |slot: usize| DVec3::from_array(nodes[slot]) + stands(support.nodes()[slot]);
+                row.pushed(|j| moved(slots[i][j] as usize))
+            }
+            Some(blended) => blended.pushed(i, stands),
         };
-        row.pushed(|j| moved(slots[i][j] as usize)) * row.multiplier
+        pushed * row.multiplier
+    }
+
+    /// Where `node` stands without contact, from where it rests (m).
+    fn stands(&self, node: u32) -> DVec3 {
+        self.standing.get(node as usize).copied().unwrap_or_default()
     }
 
     /// The greatest depth that the forces do not account for, over the greatest at rest (1).

@@ -86,6 +86,12 @@ impl Carriers {
         carriers
     }
 
+    /// None.
+    #[must_use]
+    pub fn none() -> Self {
+        Self { count: 0, nodes: [0; CARRIERS], weights: [0.0; CARRIERS], slopes: [[0.0; CARRIERS]; 2] }
+    }
+
     /// The nodes.
     #[inline]
     #[must_use]
@@ -276,6 +282,13 @@ impl Contact {
     pub fn new(proxy_node: u32, carriers: Carriers, measured: (DVec3, f64, Curvature)) -> Self {
         let (normal, depth, curvature) = measured;
         Self { proxy_node, carriers, normal, depth, share: 1.0, multiplier: 0.0, curvature }
+    }
+
+    /// A spring that touches the rounded surface `depth` below it (m): what it hangs on is its row's
+    /// ([`super::rounded`]).
+    #[must_use]
+    pub fn rounded(proxy_node: u32, depth: f64) -> Self {
+        Self::new(proxy_node, Carriers::none(), (DVec3::ZERO, depth, Curvature::default()))
     }
 
     /// Whether it touches.

@@ -29,9 +29,58 @@ impl<'a, B: Iterator<Item = (&'a [f64], [f64; 3])>> Kernel for AddRows<'_, B> {
     }
 }
 
+/// Sets `sums` to the sum of `loads`: of rows of the square matrix `entries`, as long as it, times a number each.
+pub fn combine(entries: &[f64], loads: impl Iterator<Item = (usize, f64)>, sums: &mut [f64]) {
+    widest(Combine { entries, loads, sums });
+}
+
+struct Combine<'s, L> {
+    entries: &'s [f64],
+    loads: L,
+    sums: &'s mut [f64],
+}
+
+impl<L: Iterator<Item = (usize, f64)>> Kernel for Combine<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { entries, mut loads, sums } = self;
+        sums.fill(0.0);
+        let length = sums.len();
+        // Four rows at a time, so that each sum is loaded and stored once for them.
+        while let Some((first, a)) = loads.next() {
+            let [(second, b), (third, c), (fourth, d)] = [(); 3].map(|()| loads.next().unwrap_or((first, 0.0)));
+            let row = |i: usize| &entries[i * length..(i + 1) * length];
+            let rows = row(first).iter().zip(row(second)).zip(row(third)).zip(row(fourth));
+            for (sum, (((w, x), y), z)) in sums.iter_mut().zip(rows) {
+                *sum += (a * w + b * x) + (c * y + d * z);
+            }
+        }
+    }
+}
+
+/// Sets `displacement`, three numbers a node, to how nodes move under `loads`, each the place of a node and the force on it
+/// (N), where `entries` are the compliance among them with so many rows a node (m/N). It is symmetric: its columns are its
+/// rows, which lie in order.
+pub fn respond(
+    entries: &[f64],
+    rows_per_node: usize,
+    loads: impl Iterator<Item = (usize, [f64; 3])> + Clone,
+    displacement: &mut [f64],
+) {
+    let block = rows_per_node * (rows_per_node * displacement.len() / 3);
+    if rows_per_node == 1 {
+        weigh(entries, loads.map(|(place, force)| (place * block, force)), displacement);
+    } else {
+        displacement.fill(0.0);
+        add_rows(loads.map(|(place, force)| (&entries[place * block..(place + 1) * block], force)), displacement);
+    }
+}
+
 /// Sets `sums`, three numbers a node, to the sum of `loads`: of rows that begin at a place in `entries` and have a
 /// number for each node, times a vector.
-pub fn weigh(entries: &[f64], loads: impl Iterator<Item = (usize, [f64; 3])> + Clone, sums: &mut [f64]) {
+fn weigh(entries: &[f64], loads: impl Iterator<Item = (usize, [f64; 3])> + Clone, sums: &mut [f64]) {
     widest(Weigh { entries, loads, sums });
 }
 

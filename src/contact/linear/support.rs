@@ -3,7 +3,7 @@
 //! Forces live on A only (3 |A| numbers) and displacement is u = C f, so the stiffness itself is never touched and the
 //! size of a problem is the size of its contact, not of its object.
 
-use super::rows::{add_rows, weigh};
+use super::rows::{add_rows, respond};
 use crate::object::Compliance;
 use glam::DVec3;
 
@@ -20,7 +20,7 @@ pub struct Support {
     gathered: Vec<u32>,
     /// Their places in the compliance.
     places: Vec<Option<usize>>,
-    /// Where the rows of C begin at nodes that carry force, and that force.
+    /// Places in the compliance of nodes that carry force, and that force.
     loads: Vec<(usize, [f64; 3])>,
 }
 
@@ -44,10 +44,15 @@ impl Support {
 
     /// Makes room for `nodes` nodes of an object with so many rows a node: nothing is allocated for them from then on.
     pub fn reserve(&mut self, nodes: usize, rows_per_node: usize) {
-        self.nodes.reserve(nodes);
+        self.reserve_nodes(nodes);
         self.gathered.reserve(nodes);
         self.places.reserve(nodes);
         self.compliance.reserve((rows_per_node * nodes).pow(2));
+    }
+
+    /// The same where the compliance among them is not asked for.
+    pub fn reserve_nodes(&mut self, nodes: usize) {
+        self.nodes.reserve(nodes);
     }
 
     /// Forgets all nodes.
@@ -66,6 +71,12 @@ impl Support {
             self.nodes.push(node);
         }
         *slot as usize
+    }
+
+    /// Slot of `node`, which has one.
+    #[must_use]
+    pub fn slot(&self, node: u32) -> usize {
+        self.slots[node as usize] as usize
     }
 
     /// Nodes in the order of their slots.
@@ -108,17 +119,8 @@ impl Support {
 
     /// `product = C_AA vector`.
     pub fn multiply(&self, vector: &[f64], product: &mut [f64]) {
-        let order = self.order();
-        let product = &mut product[..order];
-        // C is symmetric: its columns are its rows, which lie in order.
-        if self.rows_per_node == 1 {
-            let starts = (0..).step_by(self.nodes.len().max(1));
-            weigh(&self.compliance, starts.zip(vector.as_chunks().0.iter().copied()), product);
-        } else {
-            product.fill(0.0);
-            let scales = vector.as_chunks().0.iter().copied();
-            add_rows(self.compliance.chunks_exact((3 * order).max(1)).zip(scales), product);
-        }
+        let loads = vector.as_chunks().0.iter().copied().enumerate();
+        respond(&self.compliance, self.rows_per_node, loads, &mut product[..vector.len()]);
     }
 
     /// Numbers a node of a [response](Self::respond_along): its displacement, or where the object is isotropic, so that
@@ -159,21 +161,14 @@ impl Support {
 
     /// `displacement = C forces` on all surface nodes that the compliance covers, zero on others; `forces` are on A.
     pub fn displace(&mut self, compliance: &Compliance, forces: &[f64], displacement: &mut [f64]) {
-        let block = compliance.rows_per_node * compliance.order();
         let loads = self.nodes.iter().zip(forces.as_chunks().0).filter_map(|(&node, &force)| {
             let place = (force != [0.0; 3]).then(|| compliance.place(node)).flatten()?;
-            Some((place * block, force))
+            Some((place, force))
         });
         self.loads.clear();
         self.loads.extend(loads);
-        let loads = self.loads.iter().copied();
         let covered = &mut displacement[..3 * compliance.nodes.len()];
-        if compliance.rows_per_node == 1 {
-            weigh(&compliance.entries, loads, covered);
-        } else {
-            covered.fill(0.0);
-            add_rows(loads.map(|(start, force)| (&compliance.entries[start..start + block], force)), covered);
-        }
+        respond(&compliance.entries, compliance.rows_per_node, self.loads.iter().copied(), covered);
         if compliance.is_whole() {
             return;
         }

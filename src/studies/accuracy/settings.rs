@@ -118,7 +118,7 @@ fn compare(
 fn tolerances(scene: &Scene) -> Vec<Variant> {
     let variant = |tolerance| {
         let mut scene = scene.clone();
-        scene.contact = ContactSpec { law: ContactLaw::Following, tolerance, ..scene.contact };
+        scene.contact = ContactSpec { tolerance, ..scene.contact.by(ContactLaw::Following) };
         Variant { scene, series: ContactLaw::Following.name(), setting: format!("{tolerance:.0e}"), value: tolerance }
     };
     TOLERANCES.into_iter().map(variant).collect()
@@ -128,7 +128,7 @@ fn tolerances(scene: &Scene) -> Vec<Variant> {
 fn laws(scene: &Scene) -> Vec<Variant> {
     let variant = |law: ContactLaw| {
         let mut scene = scene.clone();
-        scene.contact.law = law;
+        scene.contact = scene.contact.by(law);
         Variant { scene, series: law.name(), setting: law.name().to_owned(), value: 0.0 }
     };
     [ContactLaw::Following, ContactLaw::Rest].into_iter().map(variant).collect()

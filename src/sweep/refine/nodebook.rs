@@ -9,13 +9,13 @@
 
 use crate::{
     Error, JointVector,
-    contact::{Backend, CHUNKS_IN_FLIGHT, Equilibrium, NodeForce, Solver, Solvers, Status},
+    contact::{Backend, Equilibrium, NodeForce, Solver, Solvers, Status},
     error,
     store::{Place, Space, beyond},
     sweep::{
         lowest::{Lattice, Lowered, settle},
         node::{Scale, Solved, holding, solve_all},
-        table::PointResult,
+        tile::PointResult,
     },
 };
 use glam::Vec3;
@@ -176,14 +176,15 @@ impl<'a, B: Backend> Nodebook<'a, B> {
     pub fn solve(&mut self, level: u32, nodes: impl IntoIterator<Item = Place>) -> Result<(), Error> {
         let wanted: BTreeSet<Place> = nodes.into_iter().filter(|node| self.nodes.get(level, node).is_none()).collect();
         let wanted: Vec<Place> = wanted.into_iter().collect();
-        for places in wanted.chunks(CHUNKS_IN_FLIGHT.saturating_mul(self.batch.max(1))) {
-            let Self { nodes, backend, batch, solvers, notices, .. } = self;
+        for places in wanted.chunks(self.batch.max(1)) {
+            let Self { nodes, backend, solvers, .. } = self;
             let configurations: Vec<JointVector> =
                 places.iter().map(|place| nodes.space.configuration(level, place)).collect();
-            let first = nodes.count();
-            let mut note = |node, notice| notices.push(format!("from the store's node {} on: {notice}", first + node));
-            let solved = solve_all(*backend, *batch, solvers, &configurations, &nodes.scale, &mut note)
+            let solved = solve_all(*backend, solvers, &configurations, &nodes.scale)
                 .map_err(|why| error!("the backend failed: {why}"))?;
+            let first = nodes.count();
+            let notices = backend.notices().into_iter();
+            self.notices.extend(notices.map(|notice| format!("from the store's node {first} on: {notice}")));
             let points = places.iter().map(|place| (level, *place));
             nodes.held.extend(points.zip(solved.into_iter().map(|(node, here)| Held::new(node, &here))));
         }

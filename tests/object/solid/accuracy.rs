@@ -40,7 +40,7 @@ fn pressed_block(squares: [i32; 3], (poisson, cell): (f64, Option<f64>), ground:
     compliance(&block, turn * DVec3::Z * (f64::from(squares[2]) * SQUARE), turn * DVec3::Z)
 }
 
-const RATIOS: [f64; 4] = [0.3, 0.45, 0.49, 0.499];
+pub const RATIOS: [f64; 4] = [0.3, 0.45, 0.49, 0.499];
 
 /// The ratios between are those of the ball that presses a block of the same size.
 #[test]

@@ -4,6 +4,7 @@
 mod accuracy;
 mod bodies;
 mod cells;
+mod convergence;
 mod fitted;
 mod gmsh;
 mod indentation;

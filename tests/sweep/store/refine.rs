@@ -157,8 +157,8 @@ fn a_store_whose_device_is_lost_is_filled_by_the_cpu_and_says_so() {
     let (whole, lossy) = (filled(usize::MAX), filled(35));
     assert!(whole.notices.is_empty() && whole.by_level[1] > 0, "{:?}, {:?}", whole.notices, whole.by_level);
     let [notice] = &lossy.notices[..] else { panic!("{:?}", lossy.notices) };
-    // The fourth batch of ten fails.
-    assert!(notice.starts_with("from the store's node 30 on: solved by "), "{notice}");
+    // The third batch of ten fails: with each some configurations behind the boundary of contact are solved.
+    assert!(notice.starts_with("from the store's node 20 on: solved by "), "{notice}");
     assert!(notice.ends_with("since a made-up device failed: device lost"), "{notice}");
     let blocks = whole.store.blocks().into_iter().zip(lossy.store.blocks());
     blocks.for_each(|((key, block), (other_key, other))| assert_eq!((key, block.nodes()), (other_key, other.nodes())));

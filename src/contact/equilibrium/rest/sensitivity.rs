@@ -8,7 +8,6 @@
 use super::RestProgram;
 use super::tangent::Moved;
 use crate::JointVector;
-use crate::contact::law::springs::Springs;
 use crate::contact::model::Model;
 use crate::proxy::Pose;
 
@@ -42,17 +41,22 @@ impl Sensitivity {
 
 impl RestProgram {
     /// Returns the sensitivity of the solution that was found last, with the proxy in `pose`.
-    pub fn sensitivity(&self, model: &Model, pose: &Pose) -> Sensitivity {
-        let Self { support, rows, slots, forces, .. } = self;
+    pub fn sensitivity(&mut self, model: &Model, pose: &Pose) -> Sensitivity {
+        let Self { rows, .. } = &*self;
         let Moved { pushing, loads: mut adjoints, answers, .. } = self.moved(model, pose);
-        let springs = Springs { contacts: rows, slots, kc: model.kc };
         let mut by_contact = JointVector::zeros(adjoints.len());
         for (&i, answers) in pushing.iter().zip(&answers) {
             let row = &rows[i];
             for (k, (adjoint, answer)) in adjoints.iter_mut().zip(answers).enumerate() {
-                springs.add_reaction(i, &row.spread(*answer), adjoint);
+                self.add_load(i, *answer, adjoint);
                 by_contact[k] -= answer * row.multiplier / (model.kc * row.share);
             }
+        }
+        let Self { support, forces, blended, .. } = self;
+        if let Some(blended) = blended {
+            let on_nodes = |adjoint: &mut Vec<f64>| blended.spread(&std::mem::take(adjoint), support, adjoint);
+            adjoints.iter_mut().for_each(on_nodes);
+            support.gather(&model.compliance);
         }
         // The forces on the object's nodes are minus the load.
         let load: Vec<f64> = forces.iter().map(|force| -force).collect();

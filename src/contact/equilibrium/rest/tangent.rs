@@ -8,14 +8,13 @@
 //! - `dq . L_qq dq' = sum_i lambda_i ( J_i dq . H_i J_i dq' + a_i . x_i''(dq, dq') ) - dl . C dl'`, H_i the second
 //!   derivative of the depth of node i before the displaced surface, u held.
 //!
-//! All is in closed form but H_i, which is a difference of the gradients a_i on both sides of the node, [`STEP`] away.
+//! All is in closed form but H_i before a surface that is not rounded, which is a difference of the gradients a_i on both
+//! sides of the node, [`STEP`] away.
 
 use super::RestProgram;
 use crate::MAX_JOINTS;
 use crate::contact::detection::Detection;
 use crate::contact::geometry::smooth::CARRIERS;
-use crate::contact::law::depth::Variation;
-use crate::contact::law::springs::{Springs, stretched_and_bent};
 use crate::contact::linear::{cholesky, support::dot};
 use crate::contact::model::Model;
 use crate::joint_matrix::{JointMatrix, add_symmetric};
@@ -45,29 +44,28 @@ pub(super) struct Moved {
 impl RestProgram {
     /// Returns how the solution that was found last changes with the joints of the proxy in `pose`.
     pub(super) fn moved(&self, model: &Model, pose: &Pose) -> Moved {
-        let Self { support, rows, slots, compliance, .. } = self;
+        let Self { rows, compliance, .. } = self;
         let joints = model.chain.joints.len();
-        let springs = Springs { contacts: rows, slots, kc: model.kc };
         let pushing: Vec<usize> = (0..rows.len()).filter(|i| rows[*i].multiplier > 0.0).collect();
-        let mut loads = vec![vec![0.0; support.order()]; joints];
+        let mut loads = vec![vec![0.0; self.order()]; joints];
         let mut deepening = vec![[0.0; MAX_JOINTS]; pushing.len()];
         for (&i, deepening) in pushing.iter().zip(&mut deepening) {
             let (row, force) = (&rows[i], self.force(i));
             for (k, load) in loads.iter_mut().enumerate() {
                 let column = model.chain.jacobian_column(pose, row.proxy_node as usize, k);
-                springs.add_reaction(i, &stretched_and_bent(row, 0.0, &Variation::translation(-column)), load);
+                self.add_turn(i, column, load);
                 deepening[k] = -force.dot(column) / row.multiplier;
             }
         }
         let respond = |load: &Vec<f64>| {
             let mut response = vec![0.0; load.len()];
-            support.multiply(load, &mut response);
+            self.respond(load, &mut response);
             response
         };
         let responses: Vec<Vec<f64>> = loads.iter().map(respond).collect();
         for (&i, deepening) in pushing.iter().zip(&mut deepening) {
             for (deepening, response) in deepening.iter_mut().zip(&responses) {
-                *deepening -= springs.depth_change(i, response);
+                *deepening -= self.depth_change(i, response);
             }
         }
         let row = |i: usize| pushing.iter().map(move |j| compliance[i * rows.len() + j]);
@@ -83,13 +81,18 @@ impl RestProgram {
     pub fn tangent(&self, model: &Model, detection: &mut Detection, pose: &Pose) -> JointMatrix {
         let joints = model.chain.joints.len();
         let Moved { pushing, loads, responses, deepening, answers } = self.moved(model, pose);
-        self.displace(model, detection);
+        if self.blended.is_none() {
+            self.displace(model, detection);
+        }
         let mut tangent = JointMatrix::default();
         for &i in &pushing {
             let (row, force) = (&self.rows[i], self.force(i));
             let node = row.proxy_node as usize;
             let columns: Vec<DVec3> = (0..joints).map(|k| model.chain.jacobian_column(pose, node, k)).collect();
-            let bend = bend(model, detection, node);
+            let bend = match &self.blended {
+                None => bend(model, detection, node),
+                Some(blended) => blended.bend(i, |node| self.stands(node)),
+            };
             for k in 0..joints {
                 for l in 0..=k {
                     let turn = match model.chain.joints[l].kind {
