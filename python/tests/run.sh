@@ -63,7 +63,10 @@ tested() {
     echo "with $("$1" --version), ${*:2}"
     environment test "$1" pytest "$wheel" "${@:2}"
     # Not `python -m`, which would look for the package in this folder first, where it is not built.
-    "$place/test/bin/pytest" --quiet -p no:cacheprovider tests
+    local pytest=("$place/test/bin/pytest" --quiet -p no:cacheprovider) forking=(tests/test_fork.py tests/test_package.py)
+    # What forks has a process in which JAX has begun no threads.
+    "${pytest[@]}" "${forking[@]}"
+    "${pytest[@]}" "${forking[@]/#/--ignore=}" tests
 }
 
 tested "$oldest" 'numpy<2'
