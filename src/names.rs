@@ -25,6 +25,11 @@ pub(crate) fn escaped(text: &str) -> Cow<'_, str> {
     escaped_but(text, &[])
 }
 
+/// Returns a number with its noun, in the singular or the plural.
+pub(crate) fn counted(count: usize, [one, more]: [&str; 2]) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
+}
+
 /// Checks that `name` may be printed in a line.
 ///
 /// # Errors

@@ -5,12 +5,12 @@ use super::{
     output::Replaced,
     report::{Describe, Text},
     tell, watch,
-    watch::{counted, duration, megabytes},
+    watch::{duration, megabytes},
 };
 use crate::{
     contact::MeshRipple,
     dataset::{Dataset, MeasuredError},
-    names::escaped,
+    names::{counted, escaped},
     sweep::{Clearance, Iterations, Lowered, SweepReport},
 };
 use serde::Serialize;
@@ -76,7 +76,10 @@ impl Describe for Baked {
         let [algorithm, backend, adapter] = [algorithm, backend, adapter].map(|text| escaped(text));
         let Iterations { mean, max } = sweep.iterations;
         let lost = unconverged + overflowed;
-        text.line(format_args!("{file}: {points} points, {contact_points} in contact, {lost} not converged"));
+        text.line(format_args!(
+            "{file}: {}, {contact_points} in contact, {lost} not converged",
+            counted(*points, ["point", "points"])
+        ));
         // What shards or an earlier run have solved leaves nothing to do.
         let (what, rate) = match *rate {
             rate if rate > 0.0 => ("solved", format!("{rate:.0} configurations a second, ")),

@@ -6,7 +6,7 @@ use super::{
     guessed,
     output::{self, Content, Folder, Overwritten, Replaced},
     report::{self, Describe, Report, Text},
-    tell, watch,
+    shell, tell,
 };
 use crate::{
     Error, MAX_AXES,
@@ -18,6 +18,7 @@ use crate::{
     },
     input,
     logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
+    names::counted,
     proxy::Chain,
     report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
@@ -230,6 +231,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         replaced,
         reading,
         of: source.of,
+        playable: !dataset.scene.is_empty(),
         axes: dataset.grid.axes,
     };
     if gridized.report.contact_points == 0 {
@@ -277,6 +279,9 @@ struct Gridized {
     of: String,
     #[serde(skip)]
     axes: Vec<Axis>,
+    /// Whether it has a scene.
+    #[serde(skip)]
+    playable: bool,
 }
 
 /// The lines of a scene that name what was identified of its object.
@@ -505,7 +510,7 @@ impl Describe for Gridized {
         }
         text.row("in contact", format_args!("{contact_points} points, torque above {} {unit}", coarse(*epsilon)));
         if *left_out > 0 {
-            text.row("left out", watch::counted(*left_out, ["row", "rows"]));
+            text.row("left out", counted(*left_out, ["row", "rows"]));
         }
         import.iter().flat_map(|import| &import.dropped).for_each(|dropped| text.row("", dropped));
         if let Some(import) = import {
@@ -547,6 +552,11 @@ impl Describe for Gridized {
             text.row("figures", format_args!("{} files in {}", self.figures.len(), folder.display()));
         }
         text.row("time", format_args!("{seconds:.2} s, of these {reading:.2} s for reading"));
+        if *contact_points > 0 {
+            // Without an arm there is nothing to feel it with.
+            let command = if self.playable { "play" } else { "info" };
+            text.row("next", format_args!("haptize {command} {}", shell::file(Path::new(file))));
+        }
         self.replaced.describe(text);
         self.folder.describe(text);
     }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::MAX_AXES;
 use crate::dataset::replace_file;
-use crate::names::escaped;
+use crate::names::{counted, escaped};
 use crate::urdf::{self, Arm, ArmJoint, Lock, Robot};
 use serde::{Serialize, Serializer};
 use std::{
@@ -98,10 +98,17 @@ impl Describe for Imported {
     fn describe(&self, text: &mut Text) {
         let Self { file, joints, nodes, .. } = self;
         let all: usize = nodes.iter().sum();
-        text.line(format_args!("{file}: {} joints, {all} contact nodes", joints.len()));
+        text.line(format_args!(
+            "{file}: {}, {}",
+            counted(joints.len(), ["joint", "joints"]),
+            counted(all, ["contact node", "contact nodes"])
+        ));
         for (joint, count) in joints.iter().zip(nodes) {
             let ([lower, upper], kind) = (joint.limits, format!("{:?}", joint.kind).to_lowercase());
-            text.row(&joint.name, format_args!("{kind:9} {lower:8.3} to {upper:.3}, {count} nodes"));
+            text.row(
+                &joint.name,
+                format_args!("{kind:9} {lower:8.3} to {upper:.3}, {}", counted(*count, ["node", "nodes"])),
+            );
         }
         // More joints than a grid has axes are felt live.
         let command = if joints.len() > MAX_AXES { "view" } else { "bake" };

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     ErrorKind,
     dataset::{Axis, Dataset, Provenance, Refinement, StatusCounts, Summary},
-    names::escaped,
+    names::{counted, escaped},
     object::{MeshSummary, Skin},
     scene::{Material, ObjectSpec, Rendering, SkinSpec},
     toml_text::{coarse, list, number, significant},
@@ -83,7 +83,7 @@ impl Describe for MeshInfo {
     fn describe(&self, text: &mut Text) {
         let Self { file, mesh } = self;
         let state = if mesh.defect.is_some() { "no closed surface" } else { "a closed surface" };
-        text.line(format_args!("{file}: {} triangles, {state}", mesh.triangles));
+        text.line(format_args!("{file}: {}, {state}", counted(mesh.triangles, ["triangle", "triangles"])));
         text.row("nodes", format_args!("{} on the surface, {} in all", mesh.surface_nodes, mesh.nodes));
         if mesh.tetrahedra > 0 {
             text.row("tetrahedra", mesh.tetrahedra);
@@ -151,7 +151,7 @@ impl Describe for Info {
         let Self { summary, file, file_bytes, absent, contradiction, body } = self;
         let (points, size) = (summary.points, *file_bytes as f64 / 1e6);
         let state = if contradiction.is_some() { "intact" } else { "sound" };
-        text.line(format_args!("{file}: {points} points, {size:.1} MB, {state}"));
+        text.line(format_args!("{file}: {}, {size:.1} MB, {state}", counted(points, ["point", "points"])));
         if let Some(contradiction) = contradiction {
             text.row("scene", format_args!("does not describe this dataset: {contradiction}"));
             text.row("", "no command but info and export takes it: bake the scene again");
@@ -197,7 +197,14 @@ impl Describe for Summary {
             text.row("residual", format_args!("at most {residual:.1e} where converged"));
         }
         if let Some([nodes, triangles]) = self.surface {
-            text.row("surface", format_args!("{nodes} nodes, {triangles} triangles"));
+            text.row(
+                "surface",
+                format_args!(
+                    "{}, {}",
+                    counted(nodes, ["node", "nodes"]),
+                    counted(triangles, ["triangle", "triangles"])
+                ),
+            );
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::{
     contact::{Model, NodeForce},
     dataset::Dataset,
     field::TorqueField,
+    names::counted,
     object::{LatticeError, Object},
     proxy::Chain,
     scene::{self, AxisSpec, GRID_STEP_SLACK, GridSpec, HapticsSpec, Interpolation, Scene},
@@ -235,11 +236,17 @@ impl Describe for Inspected {
         if let Some(dent) = dent {
             text.row("dent", format_args!("{:.1} mm, over which an arm that slides leaves it", dent * 1e3));
         }
-        text.row("solved", format_args!("in {iterations} iterations to a residual of {residual:.1e}"));
+        text.row(
+            "solved",
+            format_args!(
+                "in {} to a residual of {residual:.1e}",
+                counted(*iterations as usize, ["iteration", "iterations"])
+            ),
+        );
         let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
         text.line(format_args!(
-            "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {untouched} others \
-             are free"
+            "proxy nodes in contact: x [m] (force [N] on object nodes with weights, J by columns); {} free",
+            counted(untouched, ["other is", "others are"])
         ));
         for (number, node) in proxy_nodes.iter().enumerate() {
             let Some(contact) = &node.contact else { continue };

@@ -9,6 +9,7 @@ use super::{
     report::{Describe, Report, Text},
     tell, watch,
 };
+use crate::names::counted;
 use crate::sweep::{Merge, Merged, Progress, ranges};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -73,7 +74,7 @@ struct MergedShards {
 impl Describe for MergedShards {
     fn describe(&self, text: &mut Text) {
         let Self { baked, shards, .. } = self;
-        text.line(format_args!("{shards} shards put together"));
+        text.line(format_args!("{} put together", counted(*shards, ["shard", "shards"])));
         baked.describe(text);
     }
 }

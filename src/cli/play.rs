@@ -450,6 +450,10 @@ fn live(arguments: &Arguments) -> Result<Option<Arc<LiveScene>>, Failure> {
         (false, true) => Scene::parse(&Dataset::load(path)?.scene, path)?,
         (false, false) => return Ok(None),
     };
+    tell(format_args!(
+        "haptize: {}: preparing the object for contact that is solved in every tick ...",
+        path.display()
+    ));
     let live = if arguments.reference { LiveScene::remembering(&scene) } else { LiveScene::new(scene) };
     Ok(Some(Arc::new(live?)))
 }

@@ -8,6 +8,7 @@ use super::{
 use crate::{
     dataset::{Dataset, JointLabel, Replacement, discard_unfinished, replace_file},
     device::Device,
+    names::counted,
     render::{
         graphics::Graphics,
         haptic::Haptics,
@@ -135,15 +136,20 @@ fn exchanged(joules: f64) -> String {
     format!("{verb} {:.2} mJ", 1e3 * joules.abs())
 }
 
+/// Returns a number of ticks in words.
+fn ticks(count: usize) -> String {
+    counted(count, ["tick", "ticks"])
+}
+
 /// Describes what was felt along `joints`, below a first line that begins with `head`.
 pub fn describe_session(text: &mut Text, head: &str, s: &Summary, joints: &[JointLabel]) {
     let sizes = |torque: f64, force: f64| effort_norms([torque, force], joints.iter().map(|joint| joint.unit.as_str()));
     let contact = 100.0 * s.contact_share;
-    text.line(format_args!("{head}{:.2} s, {} ticks, {contact:.0} % in contact", s.seconds, s.ticks));
+    text.line(format_args!("{head}{:.2} s, {}, {contact:.0} % in contact", s.seconds, ticks(s.ticks)));
     // What was measured, and a store, do not say how many nodes of the object are in contact.
     let nodes = match s.max_contact_nodes {
         0 => String::new(),
-        nodes => format!(", {nodes} object nodes"),
+        nodes => format!(", {}", counted(nodes as usize, ["object node", "object nodes"])),
     };
     text.row("contact", format_args!("at most {}{nodes}", sizes(s.max_contact_torque, s.max_contact_force)));
     let proxy = sizes(s.max_contact_torque_step, s.max_contact_force_step);
@@ -167,7 +173,7 @@ pub fn describe_session(text: &mut Text, head: &str, s: &Summary, joints: &[Join
         (s.faults, "without torque, after a fault"),
     ] {
         if count > 0 {
-            text.row("note", format_args!("{count} ticks {what}"));
+            text.row("note", format_args!("{} {what}", ticks(count)));
         }
     }
 }
@@ -202,6 +208,6 @@ impl Describe for Timing {
         let stolen = stolen.filter(|seconds| *seconds > 0.0).map_or(String::new(), |seconds| {
             format!("; the hypervisor took {seconds:.2} s from this virtual machine: give it processors of its own")
         });
-        text.row("late", format_args!("{late} ticks by more than half a period: {remedy}{stolen}"));
+        text.row("late", format_args!("{} by more than half a period: {remedy}{stolen}", ticks(*late as usize)));
     }
 }

@@ -6,11 +6,12 @@ use super::{
     output::Replaced,
     report::{Describe, Report, Text},
     tell,
-    watch::{counted, megabytes},
+    watch::megabytes,
 };
 use crate::{
     contact::{Backend, Model},
     dataset::{MeasuredError, Provenance, Surface},
+    names::counted,
     proxy::Chain,
     scene::Scene,
     store::Store,

@@ -14,12 +14,15 @@ use crate::{
     control::check_rate,
     dataset::replace_file,
     device::{Address, Guard, Key, Kind as DeviceKind, attach_joints, open},
+    logs::suggested_steps,
+    names::counted,
     proxy::Chain,
     scan::{
-        LogHeader, LogWriter, Plan, RATE, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
+        LogHeader, LogWriter, Plan, RATE, ScanLog, ScanProgress, ScanReport, ScanRow, Session, Trajectory, labels,
         simulated::{Hand, SimulatedRig},
     },
     scene::ScanScene,
+    toml_text::coarse,
 };
 use serde::Serialize;
 use std::{
@@ -97,9 +100,23 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     interrupt::over();
     let (report, file) = (result?, output.display().to_string());
     let [scene, log] = [&arguments.scene, &output].map(|file| shell::file(file));
-    let next = (!report.whole).then(|| format!("haptize scan {scene} -o {log} --resume"));
+    let next = if report.whole {
+        format!("haptize gridize {log} --step {}", steps(&ScanLog::read(&output)?))
+    } else {
+        format!("haptize scan {scene} -o {log} --resume")
+    };
     let scanned = Scanned { report, file, next };
     Report::of(&scanned, scanned.report.whole)
+}
+
+/// The spacing of a grid to begin with, as an argument.
+fn steps(log: &ScanLog) -> String {
+    let joints = log.header.joints.len();
+    let range = |joint: usize| {
+        let values = || log.rows.iter().map(|row| row.q[joint]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    suggested_steps(&(0..joints).map(range).collect::<Vec<_>>()).into_iter().map(coarse).collect::<Vec<_>>().join(",")
 }
 
 /// An object that was scanned.
@@ -108,9 +125,9 @@ struct Scanned {
     #[serde(flatten)]
     report: ScanReport,
     file: String,
-    /// The command that continues a scan that was interrupted.
+    /// The command that continues a scan that was interrupted, or makes a dataset of a whole one.
     #[serde(skip)]
-    next: Option<String>,
+    next: String,
 }
 
 impl Describe for Scanned {
@@ -125,13 +142,23 @@ impl Describe for Scanned {
             (report.unreachable, "not reached by the joints"),
         ] {
             if count > 0 {
-                text.row("note", format_args!("{count} points {what}"));
+                text.row("note", format_args!("{} {what}", counted(count, ["point", "points"])));
             }
         }
         if let Some(histories) = report.histories {
-            text.row("recorded", format_args!("{histories} presses, of which gridize learns memory and friction"));
+            text.row(
+                "recorded",
+                format_args!(
+                    "{}, of which gridize learns memory and friction",
+                    counted(histories, ["press", "presses"])
+                ),
+            );
         }
-        next.iter().for_each(|command| text.row("interrupted", format_args!("continue: {command}")));
+        if report.whole {
+            text.row("next", next);
+        } else {
+            text.row("interrupted", format_args!("continue: {next}"));
+        }
     }
 }
 

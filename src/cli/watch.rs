@@ -54,11 +54,6 @@ pub fn warn_of_free_space(dataset: &Dataset) -> Result<Option<Clearance>, Failur
     Ok(clearance)
 }
 
-/// A number with its noun, in the singular or the plural.
-pub fn counted(count: usize, [one, more]: [&str; 2]) -> String {
-    format!("{count} {}", if count == 1 { one } else { more })
-}
-
 /// Prints what the sweep is going to take, before it begins.
 fn announce(progress: &Progress) {
     if let Some(remedy) = progress.mesh_ripple.and_then(|ripple| ripple.remedy()) {

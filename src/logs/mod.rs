@@ -17,7 +17,7 @@ mod rows;
 mod units;
 mod window;
 
-pub use guess::{GuessedMapping, guess};
+pub use guess::{GuessedMapping, guess, suggested_steps};
 pub use mapping::{BadRows, ColumnName, Effort, Filter, Joint, Keep, Mapping, Quantity, Table, Time, Torque};
 pub use units::ColumnUnit;
 

@@ -49,6 +49,13 @@ const GREATEST_ANGLE: f64 = 3.0 * TAU;
 /// Time between rows from which on it is not in seconds (1): nothing that touches is measured once a second.
 const LONGEST_PERIOD: f64 = 0.9;
 
+/// Returns the spacing of a grid to begin with, for samples in which each joint goes over a range (rad or m).
+#[must_use]
+pub fn suggested_steps(ranges: &[f64]) -> Vec<f64> {
+    let share = if ranges.len() == 1 { STEP } else { STEP_OF_SEVERAL };
+    ranges.iter().map(|range| share * range).collect()
+}
+
 /// A guessed mapping.
 #[derive(Clone, Debug)]
 pub struct GuessedMapping {
@@ -323,11 +330,10 @@ impl MappingFacts<'_> {
                     .to_owned(),
             );
         }
-        let share = if self.joints.len() == 1 { STEP } else { STEP_OF_SEVERAL };
         let mut text = String::new();
         // Writing to a string fails only where memory does.
         let _ = self.write(&mut text, log, &doubts);
-        GuessedMapping { text, doubts, steps: ranges.iter().map(|range| share * range).collect() }
+        GuessedMapping { text, doubts, steps: suggested_steps(&ranges) }
     }
 
     /// Speed below which the first joint stands still, where it goes to and fro.

@@ -1,4 +1,4 @@
-//! Surfaces from Wavefront OBJ files: lines `v x y z` and `f a b c ..`, which a backslash at the end joins with the
+//! Surfaces from Wavefront OBJ files: lines `v x y z` and `f a b c ..`, in small letters or capitals, which a backslash at the end joins with the
 //! next one. What stands behind a `#` and all other lines are read past.
 //!
 //! A corner of a face is the number of a vertex, from 1, or counted back from the last one so far, from -1. What
@@ -15,7 +15,7 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
     let mut lines = text::lines(&text);
     while let Some((line, text)) = lines.next() {
         let statement = statement(text);
-        if !matches!(statement.split_ascii_whitespace().next(), Some("v" | "f")) {
+        if !matches!(statement.split_ascii_whitespace().next(), Some("v" | "V" | "f" | "F")) {
             continue;
         }
         let mut statement = statement.to_owned();
@@ -26,7 +26,7 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
         }
         let bad = |what: &str| format!("line {line}: {what}: {:?}", statement.chars().take(60).collect::<String>());
         let mut words = statement.split_ascii_whitespace();
-        if words.next() == Some("v") {
+        if matches!(words.next(), Some("v" | "V")) {
             let mut position = [0.0; 3];
             for coordinate in &mut position {
                 let word = words.next().and_then(|word| word.parse().ok());

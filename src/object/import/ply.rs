@@ -5,6 +5,7 @@
 //! file's length, list lengths against the line (text) or the bytes that are left (binary).
 
 use super::{Surface, check_coordinates, node_number, polygon};
+use crate::names::counted;
 use glam::DVec3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyType, ScalarType};
@@ -54,9 +55,9 @@ fn nothing_follows(stream: &mut BufReader<File>, encoding: Encoding) -> Result<(
         return Ok(());
     }
     Err(format!(
-        "{} bytes follow the last element that its header announces: the counts in the header are wrong, or another file \
+        "{} the last element that its header announces: the counts in the header are wrong, or another file \
          was put behind this one; export the mesh again",
-        rest.len()
+        counted(rest.len(), ["byte follows", "bytes follow"])
     ))
 }
 

@@ -3,6 +3,7 @@
 //! A file of several solids is read whole. Normals have no meaning here: the corners' order gives the side.
 
 use super::{Surface, check_coordinates, node_number, text};
+use crate::names::counted;
 use glam::DVec3;
 use std::io::Read;
 
@@ -31,9 +32,9 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
         _ if !bytes.contains(&0) || is_text(&bytes) => ascii(&text::decode(&bytes))?,
         Some((count, length)) if length < bytes.len() => {
             return Err(format!(
-                "{} bytes follow the last of the {count} facets that it announces, as where files were put one after \
+                "{} the last of the {count} facets that it announces, as where files were put one after \
                  the other: export all parts as one mesh",
-                bytes.len() - length
+                counted(bytes.len() - length, ["byte follows", "bytes follow"])
             ));
         }
         Some((count, length)) => {
@@ -63,7 +64,8 @@ fn binary(facets: &[u8]) -> Vec<DVec3> {
     facets.chunks_exact(FACET).flat_map(|facet| facet[NORMAL..NORMAL + 36].chunks_exact(12).map(node)).collect()
 }
 
-/// `solid NAME`, facets, `endsolid NAME`, as often as there are solids.
+/// `solid NAME`, facets, `endsolid NAME`, as often as there are solids. Some programs write `end solid` in two words, and
+/// colours of solids and facets on lines of their own.
 fn ascii(text: &str) -> Result<Vec<DVec3>, String> {
     let (mut nodes, mut solid, mut facet) = (Vec::new(), None, None);
     for (number, line) in text::lines(text) {
@@ -76,11 +78,15 @@ fn ascii(text: &str) -> Result<Vec<DVec3>, String> {
         }
         let mut words = line.split_ascii_whitespace();
         let Some(keyword) = words.next() else { continue };
-        match (keyword.to_ascii_lowercase().as_str(), solid, facet) {
+        let mut keyword = keyword.to_ascii_lowercase();
+        if keyword == "end" {
+            keyword += &words.next().unwrap_or_default().to_ascii_lowercase();
+        }
+        match (keyword.as_str(), solid, facet) {
             ("solid", None, _) => solid = Some(number),
             ("endsolid", Some(_), None) => solid = None,
             ("facet", Some(_), None) => facet = Some(nodes.len()),
-            ("outer" | "endloop", Some(_), Some(_)) => (),
+            ("outer" | "endloop", Some(_), Some(_)) | ("color" | "colour", ..) => (),
             ("vertex", Some(_), Some(_)) => {
                 let mut node = [0.0; 3];
                 for coordinate in &mut node {

@@ -67,6 +67,19 @@ fn groups_of_an_obj_file_are_joined_at_their_seams() {
 }
 
 #[test]
+fn statements_of_an_obj_file_may_be_capitals() {
+    let text = std::fs::read_to_string(dataset("cube.obj")).unwrap();
+    for capitals in [text.replace("v ", "V "), text.replace("f ", "F "), text.to_uppercase()] {
+        let object = build_from("obj", capitals.as_bytes()).unwrap();
+        assert_eq!((object.rest.len(), object.triangles.len()), (8, 12));
+        assert!((six_volumes(&object) - 6.0).abs() < 1e-12);
+    }
+    // A line of texture or of a normal is another statement.
+    let others = text.replace("v ", "VT 0 0\nVN 0 0 1\nv ");
+    assert_eq!(build_from("obj", others.as_bytes()).unwrap().rest.len(), 8);
+}
+
+#[test]
 fn a_mesh_is_summed_up_before_it_is_an_object() {
     let cube = MeshSummary::read(&dataset("cube.stl")).unwrap();
     assert_eq!((cube.nodes, cube.triangles, cube.parts, cube.defect), (8, 12, 1, None));
@@ -99,7 +112,7 @@ fn what_a_header_does_not_announce_and_coordinates_that_are_no_lengths_are_refus
     let obj = |number: &str| obj_of(&nodes, &faces).replacen("v 0", &format!("v {number}"), 1).into_bytes();
     for (ending, content, expected) in [
         ("ply", (text.clone() + "3 0 1 2\n").into_bytes(), "7 bytes follow the last element"),
-        ("ply", [binary, &b"\0"[..]].concat(), "1 bytes follow the last element"),
+        ("ply", [binary, &b"\0"[..]].concat(), "1 byte follows the last element"),
         ("ply", with("nan 0 0"), "vertex 0, counted from 0, is not a line of finite numbers: \"nan 0 0\""),
         ("ply", with("0 0,5 0"), "vertex 0, counted from 0, is not a line of finite numbers"),
         ("ply", with("1e30 0 0"), "node 0, counted from 0, has a coordinate"),
@@ -182,6 +195,10 @@ fn an_stl_file_is_read_whole_however_its_program_writes_it() {
         format!("\n\nsolid cube\n{facets}\nendsolid cube\n").into_bytes(),
         format!("solid facet of a solid\n{facets}\nendsolid\n\n").replace('\n', "\r\n").into_bytes(),
         format!("solid cube\n{facets}\nendsolid cube\n").replace('\n', "\r").into_bytes(),
+        format!("solid cube\n{facets}\nend solid cube\n").into_bytes(),
+        format!("color 1 0 0\nsolid cube\ncolor 0.5 0.5 0.5\n{facets}\nEND SOLID\n").into_bytes(),
+        format!("solid cube\n{}\nendsolid\n", facets.replace("endfacet", "color 1 1 1\nend facet")).into_bytes(),
+        format!("solid cube\n{}\nendsolid\n", facets.replace("endloop", "end loop")).into_bytes(),
         cp1252,
         headed(b"solid block"),
         headed(b"solid block\nfacet normal"),
@@ -195,12 +212,13 @@ fn an_stl_file_is_read_whole_however_its_program_writes_it() {
     let after = |tail: &[u8]| [binary, tail].concat();
     for (content, expected) in [
         (after(binary), "684 bytes follow the last of the 12 facets"),
-        (after(b"\0"), "1 bytes follow"),
+        (after(b"\0"), "1 byte follows"),
         (binary[..binary.len() - 1].to_vec(), "was cut off"),
         (binary[..70].to_vec(), "too short"),
         (text.replace("endsolid", "# endsolid").into_bytes(), "line 86"),
         (text.split("endsolid").next().unwrap().as_bytes().to_vec(), "line 1 has no `endsolid`"),
-        (text.replacen("vertex", "color", 1).into_bytes(), "line 4: one of the words"),
+        (text.replacen("vertex", "corner", 1).into_bytes(), "line 4: one of the words"),
+        (text.replacen("vertex", "color", 1).into_bytes(), "line 8: a facet has three vertices"),
         (text.replacen("    endloop", "vertex 1 2 3", 1).into_bytes(), "line 8: a facet has three vertices"),
         (text.replacen("vertex -1", "vertex -1,5", 1).into_bytes(), "line 4: a vertex has three coordinates"),
         ([text.as_bytes(), &[0; 512]].concat(), "line 87: it holds bytes of zero"),
@@ -362,7 +380,7 @@ fn an_obj_file_is_read_however_its_program_writes_it() {
         assert!((six_volumes(&object) - 6.0).abs() < 1e-12, "{number}");
     }
     let utf16: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
-    for content in [utf16, text.to_uppercase().into_bytes(), b"<html><body>".to_vec(), Vec::new()] {
+    for content in [utf16, b"<html><body>".to_vec(), Vec::new()] {
         let error = build_from("obj", &content).unwrap_err().to_string();
         assert!(error.contains("not an OBJ text"), "{error}");
     }
