@@ -23,9 +23,11 @@ use rayon::prelude::*;
 /// drag along.
 const EXPECTED_MOTION: f64 = 2.0;
 
-/// Least thickness of a part of a rounded object, over the length (1): the lattice blends sides over two lengths each,
-/// and a part of two or less has no depth left.
-const THICKNESS: f64 = 6.0;
+/// Least thickness of a part of a rounded object, over the length (1). The blend of a place on its surface spans two
+/// lengths to each side. Where the middle of the part is no nearer, that knows nothing of the far side: depth and
+/// direction below both surfaces are theirs, and what is left of the depth in the middle, half the thickness less a third
+/// of the length, is 5/6. In a part two thirds of a length thick nothing is left.
+const THICKNESS: f64 = 4.0;
 
 /// Memory of a point of the lattice (bytes): a row of the surface at rest and a corrected one, which hang on a facet's
 /// nodes and on those of seven facets, most of them shared.
@@ -35,6 +37,12 @@ const POINT_BYTES: usize = 2048;
 const SHARE: usize = 256;
 
 impl<'a> Model<'a> {
+    /// The greatest length over which the object can be rounded (m).
+    #[must_use]
+    pub fn greatest_rounding(&self) -> f64 {
+        greatest_rounding(&self.surface)
+    }
+
     /// Points of a rounded surface's lattice up to which the compliance on all is formed: as much memory and time as
     /// [`Model::WHOLE`] surface nodes take.
     const WHOLE_POINTS: usize = 3 * Self::WHOLE;
@@ -138,6 +146,11 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
     }
 }
 
+/// The greatest length over which `surface` can be rounded, a quarter of the thickness of its thinnest part (m).
+fn greatest_rounding(surface: &RestSurface<'_>) -> f64 {
+    thin_parts::least_thickness(surface) / THICKNESS
+}
+
 /// Checks that `surface` can be rounded for `chain` as `contact` says.
 ///
 /// # Errors
@@ -145,15 +158,14 @@ fn mark(model: &Model<'_>, proximity: &mut Proximity<'_>, q: &JointVector, marke
 fn check_rounding(surface: &RestSurface<'_>, chain: &Chain, contact: ContactSpec) -> Result<(), Error> {
     let Some(length) = contact.round.filter(|_| contact.law == ContactLaw::Rest) else { return Ok(()) };
     let millimetres = |length: f64| 1e3 * length;
-    let thickness = thin_parts::least_thickness(surface);
-    if thickness < THICKNESS * length {
+    let greatest = greatest_rounding(surface);
+    if length > greatest {
         return Err(error!(
-            "the object has a part {:.1} mm thick, and contact is rounded over {:.1} mm: both sides would blend into one, \
-             and the part vanish. Take round up to {:.1} mm, a {THICKNESS:.0}th of the thickness, or leave it out of \
-             [contact]",
-            millimetres(thickness),
+            "the object has a part {:.1} mm thick, and contact is rounded over {:.1} mm: its sides would blend into one. \
+             Take round up to {:.1} mm, a quarter of the thickness, or leave it out of [contact]",
+            millimetres(THICKNESS * greatest),
             millimetres(length),
-            millimetres(thickness) / THICKNESS,
+            millimetres(greatest),
         ));
     }
     let points = Rounded::points(surface, length, greatest_radius(chain));
@@ -251,7 +263,7 @@ mod tests {
                 configurations.push(JointVector::from_slice(&[0.05 * f64::from(turn - 4), 0.0005 * f64::from(depth)]));
             }
         }
-        let nodes = reached(&whole, &configurations);
+        let nodes = nodes_of_leaves(&whole, &reached(&whole, &configurations));
         assert!(nodes.len() > 10 && 2 * nodes.len() < object.surface_nodes, "{} nodes", nodes.len());
         let mut some = Model::new(&object, &chain, scene.contact);
         some.take_compliance(Compliance::on(&object, nodes).unwrap());

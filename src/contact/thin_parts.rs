@@ -99,6 +99,7 @@ fn way_out(surface: &RestSurface<'_>, x: DVec3, direction: DVec3) -> Option<f64>
 mod tests {
     use super::*;
     use crate::{
+        contact::Model,
         fixtures::bodies::{PAPER, RADIUS, contact, gantry, object, sphere},
         object::Object,
         random::Random,

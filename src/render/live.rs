@@ -69,13 +69,6 @@ impl LiveScene {
     /// # Errors
     /// When its compliance cannot be formed.
     pub fn of(mut scene: Scene, object: Object) -> Result<Self, Error> {
-        if scene.contact.round.is_some() {
-            return Err(error!(
-                "{}: contact with a rounded surface is not solved in every tick: bake the scene (haptize bake), and play \
-                 the dataset, or leave round out of [contact]",
-                scene.path.display()
-            ));
-        }
         let follows = scene.contact.law != ContactLaw::Rest;
         scene.contact.law = ContactLaw::Rest;
         let direct = Direct::of(&scene, object)?;

@@ -14,7 +14,7 @@
 use super::{lowest, reference::Reference, table::Table, thin_parts, tile::PointResult};
 use crate::{
     Error, JointVector,
-    contact::{Model, Solvers, Status},
+    contact::{Model, Proximity, Solvers, Status},
     dataset::{Axis, Dataset, GeometryError, Grid, InterpolationError, MeasuredError},
     field::TorqueField,
     random::{Random, mix},
@@ -128,12 +128,39 @@ impl ErrorCheck<'_> {
         let mut error = reference.measured(self.interpolation, errors.collect::<Result<_, Error>>()?);
         error.cut = (!places.is_empty()).then(|| cut_cells(grid, table, &places, &reference));
         error.geometry = self.geometry_error(&reference);
+        error.rounding = self.rounding(grid, &places);
         error.friction = reference.friction_excess(self.model);
         let cells = places.par_iter().map(|place| {
             let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
             (place.q, corners.collect())
         });
         Ok(Some(Measured { error, notice: thin_parts::notice(self.model, 0.0, cells) }))
+    }
+
+    /// Returns the length over which contact could be rounded: half of what the deepest nodes at `places` move in a step
+    /// of `grid`, which is what that resolves, or what the body's thickness allows; none where that is half as much, or
+    /// where contact is rounded or not at rest (m).
+    fn rounding(&self, grid: &Grid, places: &[Place]) -> Option<f64> {
+        let contact = self.model.contact;
+        if contact.law != ContactLaw::Rest || contact.round.is_some() || places.is_empty() {
+            return None;
+        }
+        let moved = |proximity: &mut Proximity<'_>, place: &Place| {
+            let node = proximity.nearest(&place.q).node;
+            let steps = grid.axes.iter().enumerate();
+            let step = |(joint, axis): (usize, &Axis)| {
+                self.model.chain.jacobian_column(proximity.pose(), node, joint).length() * axis.step
+            };
+            steps.map(step).fold(0.0, f64::max)
+        };
+        let mut moved: Vec<f64> = places
+            .par_iter()
+            .map_init(|| Proximity::new(self.model), |proximity, place| moved(proximity, place))
+            .collect();
+        moved.sort_unstable_by(f64::total_cmp);
+        let resolved = 0.5 * moved[moved.len() / 2];
+        let length = resolved.min(self.model.greatest_rounding());
+        (length > 0.5 * resolved).then_some(length)
     }
 
     /// Returns what contact at rest, of which `reference` has the torques, leaves out; none by another law.

@@ -167,6 +167,7 @@ impl Reference {
             errors,
             cut: None,
             geometry: None,
+            rounding: None,
             friction: None,
         }
     }

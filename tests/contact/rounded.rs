@@ -7,7 +7,7 @@ use haptize::contact::{Model, Solver, Status};
 use haptize::fixtures::bodies;
 use haptize::object::Object;
 use haptize::proxy::Chain;
-use haptize::scene::{ContactSpec, ProxyNodeSpec};
+use haptize::scene::{ContactSpec, ContactSurface, ProxyNodeSpec};
 use std::collections::BTreeMap;
 
 /// Sides of the box (m), and into how many parts each is divided.
@@ -160,6 +160,7 @@ fn far_from_edges_nothing_is_rounded() {
     }
 }
 
+/// A quarter of the thickness, as the next test derives it.
 #[test]
 fn a_part_too_thin_for_the_length_is_refused_with_the_numbers() {
     let (object, chain) = (cuboid(), node());
@@ -167,7 +168,29 @@ fn a_part_too_thin_for_the_length_is_refused_with_the_numbers() {
         let contact = ContactSpec { round: Some(length), ..contact(1e4) };
         Model::reaching(&object, &chain, contact, &[]).map(|_| ()).map_err(|error| error.to_string())
     };
-    assert_eq!(reach(0.0099), Ok(()));
-    let error = reach(0.0101).unwrap_err();
-    assert!(error.contains("60.0 mm thick") && error.contains("10.1 mm") && error.contains("10.0 mm"), "{error}");
+    assert_eq!(reach(0.0149), Ok(()));
+    let error = reach(0.0151).unwrap_err();
+    assert!(error.contains("60.0 mm thick") && error.contains("15.1 mm") && error.contains("15.0 mm"), "{error}");
+}
+
+/// Depths below a face of the box, 60 mm thick, over the length: down from the surface they are those of the face in a
+/// part of four lengths, to a hundredth of one, and not in a thinner part. The middle keeps half the thickness less a
+/// third of the length.
+#[test]
+fn a_part_of_four_lengths_keeps_the_depth_of_both_faces() {
+    let (object, chain) = (cuboid(), node());
+    for (lengths, keeps) in [(4.0, true), (2.5, false)] {
+        let length = SIDES[2] / lengths;
+        let flat = ContactSpec { surface: ContactSurface::Facets, round: Some(length), ..contact(1e4) };
+        let model = Model::new(&object, &chain, flat);
+        let mut solver = Solver::new(&model);
+        let mut depth = |z: f64| -solver.gap(&[0.0, 0.0, z]) / length;
+        for side in [-1.0, 1.0] {
+            let face = depth(0.5 * side * SIDES[2]);
+            assert_eq!(face.abs() < 0.01, keeps, "{lengths} lengths: {face}");
+        }
+        let middle = depth(0.0) - 0.5 * lengths;
+        println!("{lengths} lengths: {middle}");
+        assert!((-0.6..-0.2).contains(&middle), "{lengths} lengths: {middle}");
+    }
 }

@@ -411,9 +411,16 @@ fn no_interpolation_and_no_effect_allocates_in_a_tick() {
 #[test]
 fn contact_that_is_solved_live_allocates_nothing_in_a_tick() {
     let friction = "\n[haptics.friction]\ncoefficient = 0.3\nstiffness = 1000.0\n";
-    for (name, effects) in [("organ", ""), ("organ", friction), ("sphere", ""), ("mesh", "")] {
+    let round = "[contact]\nround = 0.01";
+    for (name, contact, effects) in [
+        ("organ", "[contact]", ""),
+        ("organ", "[contact]", friction),
+        ("sphere", "[contact]", ""),
+        ("sphere", round, ""),
+        ("mesh", "[contact]", ""),
+    ] {
         let file = format!("{}/datasets/{name}.toml", env!("CARGO_MANIFEST_DIR"));
-        let text = std::fs::read_to_string(&file).unwrap() + effects;
+        let text = std::fs::read_to_string(&file).unwrap().replace("[contact]", contact) + effects;
         let live = Arc::new(LiveScene::new(Scene::parse(&text, &file).unwrap()).unwrap());
         let setup = Setup::live(Arc::clone(&live), &live.dataset()).unwrap();
         let joints = setup.chain.joints.len();
