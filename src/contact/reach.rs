@@ -24,9 +24,8 @@ use rayon::prelude::*;
 const EXPECTED_MOTION: f64 = 2.0;
 
 /// Least thickness of a part of a rounded object, over the length (1). The blend of a place on its surface spans two
-/// lengths to each side. Where the middle of the part is no nearer, that knows nothing of the far side: depth and
-/// direction below both surfaces are theirs, and what is left of the depth in the middle, half the thickness less a third
-/// of the length, is 5/6. In a part two thirds of a length thick nothing is left.
+/// lengths to each side, and so no farther than to the middle of the part: depth and direction there are those of the
+/// face but for what the correction leaves, some hundredths. In the middle four fifths of the depth are left.
 const THICKNESS: f64 = 4.0;
 
 /// Memory of a point of the lattice (bytes): a row of the surface at rest and a corrected one, which hang on a facet's
