@@ -1,25 +1,22 @@
-//! How long each kernel takes on the first adapter, what it moves and computes, and what bounds it: that of a sweep, with
-//! contacts a second beside the CPU's, and those of the object's frame update. Then how fast the device is once it is
-//! busy, and whole sweeps on that adapter beside the CPU backend.
+//! How fast the first adapter solves contact, in contacts a second beside the CPU's, and how long a frame of an object
+//! takes there. Then how fast the device is once it is busy, and whole sweeps on that adapter beside the CPU backend.
 //!
 //!     cargo bench --bench kernels
 //!
-//! Kernels are timed by the device's own clock. Bytes are what a kernel reads and writes if nothing is read twice;
-//! beside them stands the rate at which the same device copies memory. Operations of a contact are counted from its
-//! touches, for the kernel and the CPU alike.
+//! Operations of a contact are counted from its touches, for the kernel and the CPU alike; bytes are those of the
+//! compliance, read once.
 
 use glam::DVec3;
 use haptize::{
     JointVector,
     contact::{Equilibrium, Model},
-    gpu::{AdapterChoice, Context, FrameUpdate, GpuSolver, KernelTime},
+    gpu::{AdapterChoice, Context, FrameUpdate, GpuSolver},
     object::Object,
     proxy::Chain,
     scene::{ContactLaw, Scene, Shape},
     sweep::{Backend, BackendChoice, Bake, CpuBackend, build_object, sample},
 };
 use std::{
-    collections::BTreeMap,
     error::Error,
     path::Path,
     sync::{Arc, atomic::AtomicBool},
@@ -41,16 +38,6 @@ const SWEPT: usize = 2;
 /// How much finer than the scene's the grids are that a GPU is compared on: up to 882,816 points.
 const FINER: [usize; 4] = [1, 2, 3, 5];
 
-/// A kernel that moves memory at this share of the rate of copying, or more, is bound by memory.
-const MEMORY_BOUND: f64 = 0.5;
-
-/// A dispatch of fewer workgroups leaves most of a GPU idle.
-const FEW_WORKGROUPS: f64 = 128.0;
-
-/// Size of what is copied (B), and how often.
-const COPIED: u64 = 64 << 20;
-const COPIES: usize = 16;
-
 /// Operations in f32 (1/s) and bytes from the second-level cache (B/s) of an H200, by its data sheet and as measured.
 const H200: [f64; 2] = [67e12, 5.5e12];
 
@@ -64,28 +51,18 @@ const SOFTWARE_STRIDE: usize = 16;
 /// GPU raises its clock.
 const BUSY_TURNS: usize = 16;
 
-/// What is known of the adapter beforehand.
-#[derive(Clone, Copy)]
-struct Adapter {
-    /// Bytes that it reads and writes a second when it copies (B/s).
-    copying: f64,
-    hardware: bool,
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let scene = load(SCENES[1])?;
-    let plain = Context::open(AdapterChoice::Any)?;
-    println!("{}", plain.adapter());
-    let hardware = plain.adapter().hardware;
+    let context = Arc::new(Context::open(AdapterChoice::Any)?);
+    println!("{}", context.adapter());
+    let hardware = context.adapter().hardware;
     if !hardware {
         println!("a software rasteriser: small cases only, and its figures say nothing of a GPU");
     }
-    match Context::open_timed(AdapterChoice::Any) {
-        Ok(context) => kernels(&Arc::new(context), &scene)?,
-        Err(error) => println!("\nkernels skipped: {error}"),
-    }
+    SCENES.iter().try_for_each(|name| sweep(&context, name))?;
+    RINGS.iter().try_for_each(|&rings| frames(&context, &scene, rings))?;
     if hardware {
-        SCENES.iter().try_for_each(|name| busy(name))?;
+        SCENES.iter().try_for_each(|name| busy(&context, name))?;
     }
     SCENES.iter().try_for_each(|name| compare(name, if hardware { &FINER } else { &FINER[..1] }))
 }
@@ -97,46 +74,18 @@ fn load(name: &str) -> Result<Scene, Box<dyn Error>> {
     Ok(scene)
 }
 
-fn kernels(context: &Arc<Context>, scene: &Scene) -> Result<(), Box<dyn Error>> {
-    let (copying, hardware) = (copying(context)?, context.adapter().hardware);
-    println!("copies {:.1} GB/s, as many bytes read as written", 1e-9 * copying);
-    let adapter = Adapter { copying, hardware };
-    SCENES.iter().try_for_each(|name| sweep(context, name, adapter))?;
-    RINGS.iter().try_for_each(|&rings| frames(context, scene, rings, adapter))
-}
-
-/// Bytes that the device reads and writes a second when it copies (B/s).
-fn copying(context: &Context) -> Result<f64, Box<dyn Error>> {
-    let (_, _, device, queue) = context.shared();
-    let size = COPIED.min(context.binding_limit());
-    let buffer = || {
-        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
-        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
-    };
-    let (from, to) = (buffer(), buffer());
-    let copy = |times| {
-        let mut encoder = device.create_command_encoder(&Default::default());
-        (0..times).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size));
-        context.wait(&queue.submit([encoder.finish()]))
-    };
-    copy(1)?;
-    let begin = Instant::now();
-    copy(COPIES)?;
-    Ok(2.0 * size as f64 * COPIES as f64 / begin.elapsed().as_secs_f64())
-}
-
 /// One sweep over the scene's grid, after one that is not counted, with tangents as in a bake; and the same on the CPU.
-fn sweep(context: &Arc<Context>, name: &str, adapter: Adapter) -> Result<(), Box<dyn Error>> {
-    let scene = refined(&load(name)?, if adapter.hardware { SWEPT } else { 1 });
+fn sweep(context: &Arc<Context>, name: &str) -> Result<(), Box<dyn Error>> {
+    let hardware = context.adapter().hardware;
+    let scene = refined(&load(name)?, if hardware { SWEPT } else { 1 });
     let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
     let all = sample(&scene);
     let mut model = Model::reaching(&object, &chain, scene.contact, &all)?;
     model.with_tangent = true;
-    let stride = if adapter.hardware { 1 } else { SOFTWARE_STRIDE };
+    let stride = if hardware { 1 } else { SOFTWARE_STRIDE };
     let configurations: Vec<JointVector> = all.into_iter().step_by(stride).collect();
     let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
     solver.solve(&configurations)?;
-    context.kernel_times()?;
     let left = solver.left_to_cpu();
     let begin = Instant::now();
     let equilibria = solver.solve(&configurations)?;
@@ -153,17 +102,12 @@ fn sweep(context: &Arc<Context>, name: &str, adapter: Adapter) -> Result<(), Box
         object.rest.len()
     );
     let [operations, bytes] = work(&model, &equilibria).map(|sum| sum / touching);
-    let times = context.kernel_times()?;
-    let dispatches = times.iter().map(|kernel| kernel.dispatches).sum::<u64>().max(1) as f64;
-    let each = BTreeMap::from([("rest", operations * touching / dispatches)]);
-    table(&times, "configuration", |_| configurations.len(), &each, seconds, adapter);
-    let kernel: f64 = times.iter().map(|kernel| kernel.seconds).sum();
     println!(
         "  a contact takes {:.0} thousand operations and {:.0} kB of the compliance",
         1e-3 * operations,
         1e-3 * bytes
     );
-    for (what, seconds) in [("kernel", kernel), ("adapter and host", seconds), ("CPU", on_cpu)] {
+    for (what, seconds) in [("adapter", seconds), ("CPU", on_cpu)] {
         let rate = touching / seconds;
         println!("  {what:<18} {rate:>12.0} contacts/s {:>10.2} GFLOP/s", 1e-9 * rate * operations);
     }
@@ -192,12 +136,12 @@ fn work(model: &Model<'_>, equilibria: &[Equilibrium]) -> [f64; 2] {
 }
 
 /// Configurations a second of the adapter, solved again and again in memory: the last four times.
-fn busy(name: &str) -> Result<(), Box<dyn Error>> {
+fn busy(context: &Arc<Context>, name: &str) -> Result<(), Box<dyn Error>> {
     let scene = refined(&load(name)?, SWEPT);
     let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
     let configurations = sample(&scene);
     let model = Model::reaching(&object, &chain, scene.contact, &configurations)?;
-    let mut solver = GpuSolver::new(Arc::new(Context::open(AdapterChoice::Any)?), &model)?;
+    let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
     let mut rates = Vec::with_capacity(BUSY_TURNS);
     for _ in 0..BUSY_TURNS {
         let begin = Instant::now();
@@ -220,7 +164,7 @@ fn refined(scene: &Scene, finer: usize) -> Scene {
 }
 
 /// Frames of the object as a sphere of `rings` rings and segments.
-fn frames(context: &Arc<Context>, scene: &Scene, rings: usize, adapter: Adapter) -> Result<(), Box<dyn Error>> {
+fn frames(context: &Arc<Context>, scene: &Scene, rings: usize) -> Result<(), Box<dyn Error>> {
     let mut spec = scene.object.clone();
     if let Shape::Sphere { rings: r, segments: s, .. } = &mut spec.shape {
         (*r, *s) = (rings, rings);
@@ -231,83 +175,22 @@ fn frames(context: &Arc<Context>, scene: &Scene, rings: usize, adapter: Adapter)
     let mut update = FrameUpdate::new(Arc::clone(context), &object, 1.0 / 60.0)?;
     update.step(&forces)?;
     update.read()?;
-    context.kernel_times()?;
     let begin = Instant::now();
     for _ in 0..FRAMES {
         update.step(&forces)?;
     }
     update.read()?;
-    let seconds = begin.elapsed().as_secs_f64();
-    println!("\nframe update, {nodes} nodes: {FRAMES} frames");
-    // A block of three by three times a vector, for each of a row; the rest is some operations a node.
-    let (product, blocks, square) = (18.0, object.mechanics()?.stiffness.blocks.len() as f64, (nodes * nodes) as f64);
-    let operations = BTreeMap::from([("frame load", product * blocks), ("frame advance", product * square)]);
-    table(&context.kernel_times()?, "node and frame", |_| nodes * FRAMES, &operations, seconds, adapter);
+    let frame = begin.elapsed().as_secs_f64() / FRAMES as f64;
+    // A block of three by three times a vector, for each of a row and for each pair of nodes; the rest is some operations
+    // a node.
+    let products = object.mechanics()?.stiffness.blocks.len() + nodes * nodes;
+    println!(
+        "\nframe update, {nodes} nodes: {:.3} ms a frame, {:.2} GB/s, {:.2} GFLOP/s",
+        1e3 * frame,
+        1e-9 * update.bytes() as f64 / frame,
+        1e-9 * 18.0 * products as f64 / frame
+    );
     Ok(())
-}
-
-/// Prints what was timed: `count` is how many configurations, or nodes and frames, a kernel was for, `operations` how
-/// many floating-point operations one dispatch does, `seconds` what all took by the clock on the wall.
-fn table(
-    kernels: &[KernelTime],
-    what: &str,
-    count: impl Fn(&KernelTime) -> usize,
-    operations: &BTreeMap<&str, f64>,
-    seconds: f64,
-    Adapter { copying, hardware }: Adapter,
-) {
-    let whole: f64 = kernels.iter().map(|kernel| kernel.seconds).sum();
-    println!(
-        "  {:<24} {:>10} {:>11} {:>13} {:>7} {:>11} {:>9} {:>8} {:>8} {:>9}  bound by",
-        "kernel",
-        "dispatches",
-        "time [us]",
-        "[us each]",
-        "share",
-        "workgroups",
-        "[MB]",
-        "[GB/s]",
-        "of copy",
-        "[GFLOP/s]"
-    );
-    for kernel in kernels {
-        let rate = kernel.bytes as f64 / kernel.seconds;
-        let workgroups = kernel.workgroups as f64 / kernel.dispatches as f64;
-        let flops = operations.get(kernel.name.as_str()).map_or_else(
-            || "-".into(),
-            |each| format!("{:.2}", 1e-9 * each * kernel.dispatches as f64 / kernel.seconds),
-        );
-        println!(
-            "  {:<24} {:>10} {:>11.0} {:>13.3} {:>5.1} % {:>11.0} {:>9.2} {:>8.2} {:>6.1} % {:>9}  {}",
-            kernel.name,
-            kernel.dispatches,
-            1e6 * kernel.seconds,
-            1e6 * kernel.seconds / count(kernel) as f64,
-            100.0 * kernel.seconds / whole,
-            workgroups,
-            1e-6 * kernel.bytes as f64,
-            1e-9 * rate,
-            100.0 * rate / copying,
-            flops,
-            bound(rate / copying, workgroups, hardware)
-        );
-    }
-    println!(
-        "  all: {:.1} ms of {:.1} ms; the rest is the host's, transfers included ([us each]: a {what})",
-        1e3 * whole,
-        1e3 * seconds
-    );
-}
-
-/// What bounds a kernel that moves memory at `share` of the rate of copying, in dispatches of so many `workgroups`.
-fn bound(share: f64, workgroups: f64, hardware: bool) -> &'static str {
-    if share > MEMORY_BOUND {
-        "memory"
-    } else if hardware && workgroups < FEW_WORKGROUPS {
-        "few workgroups"
-    } else {
-        "arithmetic or latency"
-    }
 }
 
 /// Whole sweeps as `haptize bake` does them, of grids so many times as fine as the scene's, on the adapter and on the

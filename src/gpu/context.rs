@@ -8,9 +8,7 @@ use super::{
     adapter::{AdapterChoice, AdapterSummary, asked_for, instance, qualified},
     compiled::Compiled,
     device::MOST_WORKGROUP_MEMORY,
-    dispatch::Dispatch,
     error::GpuError,
-    timing::{KernelTime, Stopwatch},
 };
 use std::{
     collections::HashMap,
@@ -43,8 +41,6 @@ pub struct Context {
     pub(crate) queue: wgpu::Queue,
     adapter: AdapterSummary,
     failures: Arc<Mutex<Failures>>,
-    /// Where kernels are timed.
-    pub(super) stopwatch: Option<Stopwatch>,
     /// Pipelines that have been compiled, by shader, entry point and override constants.
     pub(super) compiled: Mutex<HashMap<String, Compiled>>,
 }
@@ -61,22 +57,10 @@ impl Context {
     /// [`GpuError::NoAdapter`] or [`GpuError::NotThere`] with what was found; [`GpuError::NoDevice`] when none of them
     /// gives a device.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
-        Self::open_with(choice, false)
-    }
-
-    /// The same, to time every kernel: see [`Context::kernel_times`].
-    ///
-    /// # Errors
-    /// As [`Context::open`], and [`GpuError::NoClock`] where the adapter has no such clock.
-    pub fn open_timed(choice: AdapterChoice) -> Result<Self, GpuError> {
-        Self::open_with(choice, true)
-    }
-
-    fn open_with(choice: AdapterChoice, timed: bool) -> Result<Self, GpuError> {
         let instance = instance();
         let mut refusal = None;
         for (adapter, summary) in qualified(&instance, &choice)? {
-            match Self::open_on(&instance, &adapter, summary, timed) {
+            match Self::open_on(&instance, &adapter, summary) {
                 Ok(context) => return Ok(context),
                 Err(error) => refusal = refusal.or(Some(error)),
             }
@@ -96,7 +80,7 @@ impl Context {
             if !summary.joins(opened.iter().map(|context| &context.adapter), named) {
                 continue;
             }
-            match Self::open_on(&instance, &adapter, summary, false) {
+            match Self::open_on(&instance, &adapter, summary) {
                 Ok(context) => opened.push(Arc::new(context)),
                 Err(error) if named => return Err(error),
                 Err(error) => refusal = refusal.or(Some(error)),
@@ -105,16 +89,7 @@ impl Context {
         if opened.is_empty() { Err(refusal.unwrap_or_else(|| choice.refusal(&[], &[]))) } else { Ok(opened) }
     }
 
-    fn open_on(
-        instance: &wgpu::Instance,
-        adapter: &wgpu::Adapter,
-        summary: AdapterSummary,
-        timed: bool,
-    ) -> Result<Self, GpuError> {
-        let clock = if timed { wgpu::Features::TIMESTAMP_QUERY } else { wgpu::Features::empty() };
-        if !adapter.features().contains(clock) {
-            return Err(GpuError::NoClock(summary.to_string()));
-        }
+    fn open_on(instance: &wgpu::Instance, adapter: &wgpu::Adapter, summary: AdapterSummary) -> Result<Self, GpuError> {
         let offered = adapter.limits();
         // WebGPU's defaults, which every device has, but for the sizes that decide which objects and contacts fit.
         let limits = wgpu::Limits {
@@ -123,12 +98,8 @@ impl Context {
             max_buffer_size: offered.max_buffer_size,
             ..wgpu::Limits::default()
         };
-        let descriptor = wgpu::DeviceDescriptor {
-            label: Some("haptize"),
-            required_features: clock,
-            required_limits: limits,
-            ..Default::default()
-        };
+        let descriptor =
+            wgpu::DeviceDescriptor { label: Some("haptize"), required_limits: limits, ..Default::default() };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| GpuError::NoDevice { adapter: summary.to_string(), reason: error.to_string() })?;
         let failures = Arc::new(Mutex::new(Failures::default()));
@@ -148,7 +119,6 @@ impl Context {
             queue,
             adapter: summary,
             failures,
-            stopwatch: timed.then(Stopwatch::default),
             compiled: Mutex::default(),
         })
     }
@@ -247,31 +217,5 @@ impl Context {
         }
         self.check()?;
         refused.map_or(Ok(made), |error| Err(error.into()))
-    }
-
-    /// Records `dispatches`, in order: in one pass, unless they are timed.
-    pub(super) fn record<'a>(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        dispatches: impl IntoIterator<Item = Dispatch<'a>>,
-    ) {
-        if let Some(stopwatch) = &self.stopwatch {
-            return stopwatch.record(&self.device, encoder, dispatches);
-        }
-        let mut pass = encoder.begin_compute_pass(&Default::default());
-        dispatches.into_iter().for_each(|dispatch| dispatch.record(&mut pass));
-    }
-
-    /// Returns the time of every kernel since the last call, in the order in which they first ran; nothing where
-    /// kernels are not timed. Waits for the device.
-    ///
-    /// # Errors
-    /// When the device has failed.
-    pub fn kernel_times(&self) -> Result<Vec<KernelTime>, GpuError> {
-        let Some(stopwatch) = &self.stopwatch else { return Ok(Vec::new()) };
-        // Later than all that was recorded.
-        let last = self.queue.submit([]);
-        let period = 1e-9 * f64::from(self.queue.get_timestamp_period());
-        stopwatch.take_times(period, |ticks| self.map(ticks, ticks.size(), &last))
     }
 }

@@ -74,7 +74,6 @@ pub(super) struct RestDevice {
     kinds: Vec<JointKind>,
     section: usize,
     record: usize,
-    model_bytes: u64,
     lanes: [Lane; 2],
 }
 
@@ -129,10 +128,8 @@ impl RestDevice {
         let room = Room { section, rows: rows as usize, record };
         let lane = |_| Lane::new(&context, &kernel, &uploaded, room);
         let lanes = [lane(0)?, lane(1)?];
-        let RestModel { chain, surface, mesh, compliance, .. } = &uploaded;
-        let model_bytes = [chain, surface, mesh, compliance].map(StorageBuffer::size).iter().sum();
         let kinds = model.chain.joints.iter().map(|joint| joint.kind).collect();
-        Ok(Self { context, kernel, parameters, kinds, section, record, model_bytes, lanes })
+        Ok(Self { context, kernel, parameters, kinds, section, record, lanes })
     }
 
     /// The device.
@@ -210,8 +207,7 @@ impl Device for RestDevice {
         // No record is zero where the kernel has written one.
         lane.records.clear(&mut encoder, records);
         lane.touches.clear(&mut encoder, COUNT);
-        let bytes = self.model_bytes + size_of_val(&motions[..]) as u64 + records;
-        self.context.record(&mut encoder, [self.kernel.dispatch(&lane.bound, count as u32, bytes)]);
+        self.kernel.record(&mut encoder.begin_compute_pass(&Default::default()), &lane.bound, count as u32);
         lane.staging.copy(&mut encoder, 0, &lane.records, records);
         lane.staging.copy(&mut encoder, records, &lane.touches, COUNT + TOUCH * lane.staged as u64);
         lane.ticket = Some(self.context.queue.submit([encoder.finish()]));

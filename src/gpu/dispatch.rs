@@ -1,35 +1,5 @@
-//! One dispatch of a kernel.
-//!
 //! Counts of workgroups above the limit of one dimension are folded into two; the shader unfolds them and guards the
 //! tail.
-
-/// One dispatch of a kernel.
-#[derive(Clone, Copy)]
-pub struct Dispatch<'a> {
-    /// The kernel's name.
-    pub name: &'a str,
-    /// What runs.
-    pub pipeline: &'a wgpu::ComputePipeline,
-    /// On what.
-    pub bound: &'a wgpu::BindGroup,
-    /// Number of workgroups.
-    pub workgroups: u32,
-    /// Bytes that it reads and writes, each element once, twice where it does both (B).
-    pub bytes: u64,
-}
-
-impl Dispatch<'_> {
-    /// Records it in `pass`.
-    pub fn record(&self, pass: &mut wgpu::ComputePass<'_>) {
-        if self.workgroups == 0 {
-            return;
-        }
-        let [x, y] = fold(self.workgroups);
-        pass.set_pipeline(self.pipeline);
-        pass.set_bind_group(0, self.bound, &[]);
-        pass.dispatch_workgroups(x, y, 1);
-    }
-}
 
 /// Most workgroups that one dimension of a dispatch may have: WebGPU's default limit.
 pub const WORKGROUPS_PER_DIMENSION: u32 = 65_535;

@@ -55,11 +55,6 @@ pub enum GpuError {
         /// The limit (B).
         limit: u64,
     },
-    /// The adapter cannot say how long a kernel takes.
-    #[error(
-        "adapter {0} does not stamp the time of its commands (TIMESTAMP_QUERY): its kernels cannot be timed one by one"
-    )]
-    NoClock(String),
     /// The kernel takes arms of as many joints as a grid has axes.
     #[error("the GPU solves for arms of at most {MAX_AXES} joints, not {0}. Use --backend cpu")]
     Joints(usize),

@@ -7,8 +7,7 @@
 //! nodes as have an inverse here.
 
 use super::{
-    buffer::StorageBuffer, context::Context, dispatch::Dispatch, error::GpuError, kernel::Kernel,
-    layout::FrameParameters, shaders,
+    buffer::StorageBuffer, context::Context, error::GpuError, kernel::Kernel, layout::FrameParameters, shaders,
 };
 use crate::object::{Compliance, Factor, Mechanics, Object};
 use crate::scene::GraphicsEffects;
@@ -24,15 +23,6 @@ struct FramePass {
     kernel: Kernel,
     bound: wgpu::BindGroup,
     workgroups: u32,
-    /// See [`Dispatch::bytes`].
-    bytes: u64,
-}
-
-impl FramePass {
-    fn dispatch(&self) -> Dispatch<'_> {
-        let Self { kernel, bound, workgroups, bytes } = self;
-        kernel.dispatch(bound, *workgroups, *bytes)
-    }
 }
 
 /// The nodes' state on the device, and the stages that advance it.
@@ -103,16 +93,14 @@ impl FrameUpdate {
             ("inverse", &inverse),
         ];
         let overrides: &[(&str, f64)] = if is_isotropic { &[("ISOTROPIC", 1.0)] } else { &[] };
-        let stage = |shader, workgroups, bytes| -> Result<FramePass, GpuError> {
+        let stage = |shader, workgroups| -> Result<FramePass, GpuError> {
             let kernel = Kernel::new(gpu, shader, overrides)?;
             let bound = kernel.bind(gpu, &buffers)?;
-            Ok(FramePass { kernel, bound, workgroups, bytes })
+            Ok(FramePass { kernel, bound, workgroups })
         };
-        let load = buffers[1..7].iter().map(|(_, buffer)| buffer.size()).sum();
-        let advance = inverse.size() + right.size() + 2 * state.size();
         let stages = [
-            stage(&shaders::FRAME_LOAD, (nodes as u32).div_ceil(WORKGROUP), load)?,
-            stage(&shaders::FRAME_ADVANCE, nodes as u32, advance)?,
+            stage(&shaders::FRAME_LOAD, (nodes as u32).div_ceil(WORKGROUP))?,
+            stage(&shaders::FRAME_ADVANCE, nodes as u32)?,
         ];
         let bytes = buffers.iter().map(|(_, buffer)| buffer.size()).sum();
         Ok(Self { context, nodes, forces, state, padded: Vec::new(), stages, bytes })
@@ -134,7 +122,9 @@ impl FrameUpdate {
         self.padded.resize(self.nodes, [0.0; 4]);
         self.forces.write(&self.context, &self.padded);
         let mut encoder = self.context.device.create_command_encoder(&Default::default());
-        self.context.record(&mut encoder, self.stages.iter().map(FramePass::dispatch));
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        self.stages.iter().for_each(|stage| stage.kernel.record(&mut pass, &stage.bound, stage.workgroups));
+        drop(pass);
         self.context.queue.submit([encoder.finish()]);
         self.context.check()
     }

@@ -7,7 +7,7 @@ use super::{
     buffer::StorageBuffer,
     compiled::{Binding, Compiled},
     context::Context,
-    dispatch::Dispatch,
+    dispatch::fold,
     error::GpuError,
     shaders::Shader,
 };
@@ -98,10 +98,14 @@ impl Kernel {
         })
     }
 
-    /// Its dispatch of so many workgroups on what [`Self::bind`] gave; `bytes` are those that it reads and writes, see
-    /// [`Dispatch`].
-    #[must_use]
-    pub fn dispatch<'a>(&'a self, bound: &'a wgpu::BindGroup, workgroups: u32, bytes: u64) -> Dispatch<'a> {
-        Dispatch { name: &self.name, pipeline: &self.compiled.pipeline, bound, workgroups, bytes }
+    /// Records in `pass` so many workgroups of it on what [`Self::bind`] gave.
+    pub fn record(&self, pass: &mut wgpu::ComputePass<'_>, bound: &wgpu::BindGroup, workgroups: u32) {
+        if workgroups == 0 {
+            return;
+        }
+        let [x, y] = fold(workgroups);
+        pass.set_pipeline(&self.compiled.pipeline);
+        pass.set_bind_group(0, bound, &[]);
+        pass.dispatch_workgroups(x, y, 1);
     }
 }

@@ -12,9 +12,8 @@
 //! | `unpack` | from what the kernel wrote to equilibria |
 //! | `solver` | the backend of a sweep |
 //! | `frame` | the object's nodes, one passive step a frame |
-//! | `kernel`, `compiled`, `dispatch` | one compute pipeline with its bindings; its dispatches |
+//! | `kernel`, `compiled`, `dispatch` | one compute pipeline with its bindings; how its workgroups are counted |
 //! | `buffer` | buffers of the device, and how the host reads them |
-//! | `timing` | how long each kernel takes, where that is asked for |
 //!
 //! A shader in `shaders/` and its CPU twin share names and order of statements. Kernels compute in f32, with
 //! coordinates relative to the object's centre, within WebGPU's default limits. They solve contact with the surface at
@@ -34,7 +33,6 @@ pub mod layout;
 mod model;
 pub mod shaders;
 mod solver;
-mod timing;
 mod unpack;
 
 pub(crate) use adapter::asked_for;
@@ -45,5 +43,4 @@ pub use error::GpuError;
 pub use frame::FrameUpdate;
 pub use shaders::GPU_LEAST_DIVISOR;
 pub use solver::GpuSolver;
-pub use timing::KernelTime;
 pub use unpack::GPU_RESIDUAL;

@@ -154,12 +154,6 @@ impl Accounts {
         self.first_stored.map_or(0.0, |first| self.field_work + self.stored + self.relaxed - first)
     }
 
-    /// Returns what damping, friction, stops and controller have taken from the proxy (J).
-    #[must_use]
-    pub fn taken_from_field(&self) -> f64 {
-        self.proxy_dissipation + self.friction_dissipation + self.control_dissipation - self.stop_work
-    }
-
     /// Books the state at a tick: what the object has stored, if the dataset holds it, and has lost since the tick
     /// before; and whether it is touched.
     pub(super) fn at_tick(&mut self, kinetic: f64, spring: f64, (stored, relaxed): (Option<f64>, f64), touched: bool) {
