@@ -22,8 +22,9 @@ pub struct Given {
     pub cell: Option<f64>,
 }
 
-/// Returns the scene at `path`, made of the `text` of a scan's scene: the solid in the surface `shape`, which the OBJ file
-/// `mesh` holds and the scene calls `name`, of Young's modulus `young` (Pa), lying on the ground where that clamps it; rigid contact; a damping of the proxy that is passive; and a grid over `range`.
+/// Returns the scene at `path`, made of the `text` of a scan's scene: the solid in the surface `shape`, which the OBJ
+/// file `mesh` holds and the scene calls `name`, of Young's modulus `young` (Pa), lying on the ground where that clamps
+/// it; rigid contact; a damping of the proxy that is passive; and a grid over `range`.
 ///
 /// # Errors
 /// When the file cannot be read, or the scene of the scan is not valid.

@@ -40,7 +40,7 @@ fn place(scene: &Scene, random: &mut Random) -> JointVector {
 /// Along the scenes' own motions, a millisecond a step, and after leaps from one random configuration to another.
 #[test]
 fn live_contact_is_that_of_the_solver_wherever_it_comes_from() {
-    for (name, round) in [("sphere", ""), ("mesh", ""), ("organ", ""), ("touch", ""), ("sphere", "\nround = 0.01")] {
+    for (name, round) in [("sphere", ""), ("mesh", ""), ("organ", ""), ("touch", ""), ("mesh", "\nround = 0.005")] {
         let scene = scene(name, |text| text.replace("[contact]", &format!("[contact]{round}")));
         with_model(&scene, |model| {
             let (mut live, mut solver) = (LiveSolver::new(model), Solver::new(model));
