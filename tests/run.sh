@@ -95,9 +95,9 @@ tests() {
     local messages programs name failed=0
     messages=$(cargo test --locked --workspace --features viewer --quiet --no-run --message-format json-render-diagnostics) || return 1
     programs=$(sed -n 's/.*"manifest_path":"\([^"]*\)\/Cargo.toml".*"profile":{[^}]*"test":true}.*"executable":"\([^"]*\)".*/\1:\2/p' <<<"$messages")
-    local clock='/devices-[0-9a-f]*$' long='/(contact|viewer|haptize|cli|reliability)-[0-9a-f]*$'
+    local clock='/devices-[0-9a-f]*$' long='/(object|cli|contact|sweep|reliability|haptize|viewer)-[0-9a-f]*$'
     {
-        for name in contact viewer haptize cli reliability; do grep -E "/$name-[0-9a-f]*$" <<<"$programs"; done
+        for name in object cli contact sweep reliability haptize viewer; do grep -E "/$name-[0-9a-f]*$" <<<"$programs"; done
         grep -Ev "$long|$clock" <<<"$programs"
     } | RUST_TEST_THREADS=$(($(nproc) / 2 + 1)) run_programs 2 || failed=1
     grep -E "$clock" <<<"$programs" | run_programs 1 || failed=1

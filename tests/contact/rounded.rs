@@ -22,13 +22,13 @@ fn cuboid() -> Object {
     let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
     let mut nodes = Vec::new();
     let mut triangles = Vec::new();
-    for axis in 0..3 {
+    for (axis, &parts) in PARTS.iter().enumerate() {
         let (across, along) = ((axis + 1) % 3, (axis + 2) % 3);
         for (side, u, v) in
             (0..2).flat_map(|side| (0..PARTS[across]).flat_map(move |u| (0..PARTS[along]).map(move |v| (side, u, v))))
         {
             let mut corners = [(u, v), (u + 1, v), (u + 1, v + 1), (u, v + 1)].map(|(u, v)| {
-                let mut at = [side * PARTS[axis]; 3];
+                let mut at = [side * parts; 3];
                 (at[across], at[along]) = (u, v);
                 *numbers.entry(at).or_insert_with(|| {
                     let place = |a: usize| SIDES[a] * (f64::from(at[a]) / f64::from(PARTS[a]) - 0.5);
