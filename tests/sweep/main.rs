@@ -8,6 +8,7 @@ mod accuracy;
 #[path = "../common/mod.rs"]
 mod common;
 mod dataset;
+mod edges;
 mod equilibria;
 mod failure;
 mod field;
