@@ -2,6 +2,7 @@
 //! of one newton along another's.
 
 use super::rows::{combine, respond};
+use super::support::ABSENT;
 use crate::object::Compliance;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -21,9 +22,6 @@ pub struct Condensed {
     /// Greatest entry of the diagonal (m/N).
     pub greatest: f64,
 }
-
-/// No place.
-const ABSENT: u32 = u32::MAX;
 
 impl Condensed {
     /// Condenses `compliance` on the points that are `wanted` and whose nodes it covers all. A point's row is the sum of
