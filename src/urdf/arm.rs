@@ -6,7 +6,7 @@
 //! last moving joint before them, branches beside the chain included.
 
 use super::group::Group;
-use super::robot::{Joint, JointType, Robot};
+use super::robot::{Joint, JointType, Mimic, Robot};
 use super::{Inertial, Placed};
 use crate::Error;
 use crate::MAX_JOINTS;
@@ -129,10 +129,11 @@ impl Arm {
     }
 }
 
-/// Motions of the joints that do not move: identity if fixed, that of its value if locked.
+/// Motions of the joints that do not move: identity if fixed, that of its value if locked or if it follows a locked one.
 fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error> {
     let fixed = robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointType::Fixed);
     let mut held: HashMap<usize, DAffine3> = fixed.map(|(number, _)| (number, DAffine3::IDENTITY)).collect();
+    let mut values: HashMap<&str, f64> = HashMap::new();
     for Lock { joint: name, value } in locks {
         let refuse = |message: String| Err(Error::at(&robot.path, message));
         let Some(number) = robot.joints.iter().position(|joint| joint.name == *name) else {
@@ -146,21 +147,45 @@ fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error
         {
             return refuse(format!("joint {name:?} cannot be locked at {value}: its limits are {lower} and {upper}"));
         }
-        let motion = match joint.kind {
-            JointType::Revolute | JointType::Continuous => {
-                DAffine3::from_quat(DQuat::from_axis_angle(joint.axis, *value))
-            }
-            JointType::Prismatic => DAffine3::from_translation(*value * joint.axis),
-            JointType::Fixed => return refuse(format!("joint {name:?} is fixed already: leave out its --lock")),
-            JointType::Floating | JointType::Planar => {
-                return refuse(format!("joint {name:?} has more than one coordinate: make it fixed in the file"));
-            }
+        let Some(motion) = motion(joint, *value) else {
+            return refuse(match joint.kind {
+                JointType::Fixed => format!("joint {name:?} is fixed already: leave out its --lock"),
+                _ => format!("joint {name:?} has more than one coordinate: make it fixed in the file"),
+            });
         };
         if held.insert(number, motion).is_some() {
             return refuse(format!("joint {name:?} is locked twice: keep one --lock"));
         }
+        values.insert(name, *value);
     }
-    Ok(held)
+    // A joint may follow one that follows another: each round goes one farther.
+    loop {
+        let before = held.len();
+        for (number, joint) in robot.joints.iter().enumerate().filter(|(_, joint)| joint.mimic.is_some()) {
+            let value = joint.mimic.as_ref().and_then(|Mimic { joint, multiplier, offset }| {
+                values.get(joint.as_str()).map(|value| multiplier * value + offset)
+            });
+            let motion = value.and_then(|value| Some((value, motion(joint, value)?)));
+            if let (Some((value, motion)), false) = (motion, held.contains_key(&number)) {
+                held.insert(number, motion);
+                values.insert(&joint.name, value);
+            }
+        }
+        if held.len() == before {
+            return Ok(held);
+        }
+    }
+}
+
+/// The motion of a joint of one coordinate, which has this value (rad or m).
+fn motion(joint: &Joint, value: f64) -> Option<DAffine3> {
+    match joint.kind {
+        JointType::Revolute | JointType::Continuous => {
+            Some(DAffine3::from_quat(DQuat::from_axis_angle(joint.axis, value)))
+        }
+        JointType::Prismatic => Some(DAffine3::from_translation(value * joint.axis)),
+        JointType::Fixed | JointType::Floating | JointType::Planar => None,
+    }
 }
 
 /// Joints from the root to the link `tip`.
@@ -265,12 +290,15 @@ impl Builder<'_> {
     fn movement(&mut self, joint: &Joint) -> Result<(JointKind, [f64; 2]), Error> {
         let name = &joint.name;
         let refuse = |message: String| Err(self.robot.source().error(joint.span.clone(), message));
-        if let Some(leader) = &joint.mimic {
+        if let Some(Mimic { joint: leader, .. }) = &joint.mimic {
             let chain = self.way.iter().map(|&number| &self.robot.joints[number]).filter(|other| other.name != *name);
-            if chain.into_iter().any(|other| other.name == *leader || other.mimic.as_ref() == Some(leader)) {
+            if chain
+                .into_iter()
+                .any(|other| other.name == *leader || other.mimic.as_ref().is_some_and(|mimic| mimic.joint == *leader))
+            {
                 return refuse(format!(
                     "joint {name:?} follows {leader:?} (mimic), as another joint of the chain does or is, and the \
-                     joints of a scene move independently: hold it with --lock {name}=VALUE, or remove <mimic>"
+                     joints of a scene move independently: hold both with --lock {leader}=VALUE, or remove <mimic>"
                 ));
             }
             let message = format!(

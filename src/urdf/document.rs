@@ -1,17 +1,10 @@
 //! XML of a robot file: elements, their attributes as numbers, and errors at their place.
 
 use crate::Error;
-use crate::{names, scene};
+use crate::{names, scene, xml};
 use glam::DVec3;
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::{Document, Node};
 use std::{ops::Range, path::Path};
-
-/// Most XML nodes of a file: a hundred times as many as those robots have.
-const MAX_NODES: u32 = 1 << 20;
-
-/// Most attributes of an element, and namespaces of a file: ten times as many as robots have. The parser compares each
-/// with all others.
-const MAX_ATTRIBUTES: usize = 100;
 
 /// Largest size of any number [m, rad, kg, kg m^2, N m]: beyond every robot in SI units.
 const LARGEST: f64 = 1e6;
@@ -39,7 +32,7 @@ impl<'a> Source<'a> {
 
     /// Returns the line of the byte at `offset`, from 1.
     pub fn line(&self, offset: usize) -> usize {
-        self.text.as_bytes().iter().take(offset).filter(|byte| **byte == b'\n').count() + 1
+        xml::line(self.text, offset)
     }
 
     /// Parses the text as XML without a document type, in which entities may be defined that grow without bound.
@@ -47,62 +40,15 @@ impl<'a> Source<'a> {
         if self.path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xacro")) {
             return Err(self.error(0..0, XACRO));
         }
-        self.check_attributes()?;
-        let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
-        let document = Document::parse_with_options(self.text, options).map_err(|error| self.xml_error(&error))?;
+        let document = xml::parse(self.text).map_err(|error| {
+            let is_xacro = error.prefix.as_deref() == Some("xacro");
+            self.error(error.span, if is_xacro { XACRO.to_owned() } else { error.reason })
+        })?;
         let is_xacro = |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|uri| uri.contains("xacro"));
         match document.descendants().find(is_xacro) {
             Some(node) => Err(self.error(node.range(), XACRO)),
             None => Ok(document),
         }
-    }
-
-    /// Refuses what the parser would take very long for. No value of an attribute holds a `<`, so an element's are
-    /// between its own and the next.
-    fn check_attributes(&self) -> Result<(), Error> {
-        let mut start = 0;
-        for element in self.text.split_inclusive('<') {
-            let values = element.split('=').skip(1).filter(|value| value.trim_start().starts_with(['"', '\'']));
-            if values.count() > MAX_ATTRIBUTES {
-                let message = format!("an element has more than {MAX_ATTRIBUTES} attributes, which no robot has");
-                return Err(self.error(start..start, message));
-            }
-            start += element.len();
-        }
-        match self.text.match_indices("xmlns").nth(MAX_ATTRIBUTES) {
-            Some((place, name)) => {
-                let message = format!("the file declares more than {MAX_ATTRIBUTES} namespaces, which no robot has");
-                Err(self.error(place..place + name.len(), message))
-            }
-            None => Ok(()),
-        }
-    }
-
-    fn xml_error(&self, error: &roxmltree::Error) -> Error {
-        match error {
-            roxmltree::Error::DtdDetected => {
-                let start = self.text.find("<!DOCTYPE").unwrap_or(0);
-                let message = "a robot file has no document type, and none is read, since entities can grow without \
-                               bound: remove <!DOCTYPE ..>";
-                self.error(start..start + "<!DOCTYPE".len(), message)
-            }
-            roxmltree::Error::UnknownNamespace(prefix, place) if prefix == "xacro" => {
-                let offset = self.offset(*place);
-                self.error(offset..offset, XACRO)
-            }
-            _ => {
-                let offset = self.offset(error.pos());
-                self.error(offset..offset, format!("this is not well-formed XML: {error}"))
-            }
-        }
-    }
-
-    fn offset(&self, place: roxmltree::TextPos) -> usize {
-        let before: usize =
-            self.text.split_inclusive('\n').take(place.row.saturating_sub(1) as usize).map(str::len).sum();
-        let line = self.text.get(before..).unwrap_or_default();
-        let column = place.col.saturating_sub(1) as usize;
-        before + line.char_indices().nth(column).map_or(line.trim_end().len(), |(offset, _)| offset)
     }
 
     /// Returns the text of an attribute that must be there.

@@ -36,5 +36,5 @@ pub use arm::{Arm, ArmJoint, Lock, Note};
 pub use drawn::drawn_shapes;
 pub use link::{Geometry, Inertial, Link, Placed};
 pub use nodes::{ContactNodes, sample};
-pub use robot::{Joint, JointType, Robot};
+pub use robot::{Joint, JointType, Mimic, Robot};
 pub use text::write_scene;

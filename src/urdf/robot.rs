@@ -51,8 +51,19 @@ pub struct Joint {
     pub effort: Option<f64>,
     /// Greatest speed, where the file gives it (rad/s or m/s).
     pub velocity: Option<f64>,
-    /// The joint that it follows, where it does.
-    pub mimic: Option<String>,
+    /// How it follows another joint, where it does.
+    pub mimic: Option<Mimic>,
+}
+
+/// How a joint follows another: its coordinate is an affine function of that one's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mimic {
+    /// Name of the joint that it follows.
+    pub joint: String,
+    /// Factor on that one's coordinate (1, m/rad or rad/m).
+    pub multiplier: f64,
+    /// Coordinate where that one is at zero (rad or m).
+    pub offset: f64,
 }
 
 /// How a joint moves.
@@ -158,6 +169,14 @@ impl Robot {
     }
 }
 
+fn mimic(source: &Source<'_>, node: Node<'_, '_>) -> Result<Mimic, Error> {
+    Ok(Mimic {
+        joint: source.required(node, "joint")?.to_owned(),
+        multiplier: source.number(node, "multiplier")?.unwrap_or(1.0),
+        offset: source.number(node, "offset")?.unwrap_or(0.0),
+    })
+}
+
 fn joint(source: &Source<'_>, node: Node<'_, '_>, links: &HashMap<String, usize>) -> Result<Joint, Error> {
     let name = source.required(node, "name")?.to_owned();
     let kind = source.required(node, "type")?;
@@ -203,7 +222,7 @@ fn joint(source: &Source<'_>, node: Node<'_, '_>, links: &HashMap<String, usize>
         limits,
         effort: number("effort")?,
         velocity: number("velocity")?,
-        mimic: child(node, "mimic").map(|mimic| source.required(mimic, "joint").map(str::to_owned)).transpose()?,
+        mimic: child(node, "mimic").map(|node| mimic(source, node)).transpose()?,
         span: node.range(),
         name,
     })

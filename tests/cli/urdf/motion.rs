@@ -217,3 +217,25 @@ fn a_joint_that_follows_one_beside_the_chain_moves_by_itself() {
     assert!(followed.notes.iter().any(|note| note.message.contains("follows \"camera_tilt\"")), "{:?}", followed.notes);
     assert!(arm(&follows("yaw"), "probe", &[]).is_err());
 }
+
+/// A joint that follows a locked one, and one that follows that in turn, are where the file's affine functions put them.
+#[test]
+fn joints_that_follow_a_locked_one_are_held_with_it() {
+    let text = std::fs::read_to_string(file("arm.urdf")).unwrap();
+    let bend = "<limit lower=\"-1.2\" upper=\"1.5\" effort=\"5\" velocity=\"3\"/>";
+    let roll = "<limit lower=\"-1\" upper=\"1\"/>";
+    let chained = text
+        .replace(bend, &format!("{bend}<mimic joint=\"lift\" multiplier=\"-4\" offset=\"0.3\"/>"))
+        .replace(roll, &format!("{roll}<mimic joint=\"bend\"/>"));
+    let bodies = |arm: &Arm| arm.joints.iter().map(|joint| (joint.name.clone(), joint.inertial)).collect::<Vec<_>>();
+    let held = arm(&chained, "probe", &[("lift", 0.05)]).unwrap().1;
+    let (bend, roll) = (-4.0 * 0.05 + 0.3, -4.0 * 0.05 + 0.3);
+    let one_by_one = arm(&text, "probe", &[("lift", 0.05), ("bend", bend), ("roll", roll)]).unwrap().1;
+    assert_eq!(held.joints.len(), 1);
+    assert_eq!(format!("{:?}", bodies(&held)), format!("{:?}", bodies(&one_by_one)));
+    // A lock of its own goes before.
+    let own = arm(&chained, "probe", &[("lift", 0.05), ("roll", -0.4)]).unwrap().1;
+    let other = arm(&text, "probe", &[("lift", 0.05), ("bend", bend), ("roll", -0.4)]).unwrap().1;
+    assert_eq!(format!("{:?}", bodies(&own)), format!("{:?}", bodies(&other)));
+    assert_ne!(format!("{:?}", bodies(&own)), format!("{:?}", bodies(&held)));
+}

@@ -36,7 +36,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
         "<limit lower=\"-1\" upper=\"1\"/>",
         "<limit lower=\"-1\" upper=\"1\"/><mimic joint=\"grip\"/>",
         5,
-        &["mimic", "--lock turn"],
+        &["mimic", "--lock grip"],
     ),
     ("revolute", "floating", 5, &["floating", "fixed"]),
     ("revolute", "planar", 5, &["planar", "fixed"]),
@@ -64,7 +64,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
         &["\"nowhere\"", "--package-path"],
     ),
     ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"https://a.org/a.stl\"/>", 3, &["https", "copy"]),
-    ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"arm.urdf\"/>", 3, &[".obj, .stl or .ply"]),
+    ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"arm.urdf\"/>", 3, &[".obj, .stl, .ply"]),
     ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"meshes/tip.obj\" scale=\"1 0 1\"/>", 3, &["scale"]),
     (
         "<link name=\"hand\"/>",
