@@ -161,7 +161,7 @@ fn damaged_files_are_refused_with_the_place() {
         ("vtu", vtu.replace("</Cells>", "").into(), "not well-formed XML"),
         ("vtu", read("raw_lz4.vtu")[..1400].to_vec(), "damaged or cut off"),
         ("vtu", text("base64_zlib.vtu").replacen("eF5jYCAOz", "eF5jYCAPz", 1).into(), "damaged or cut off"),
-        ("msh", read("binary_4.msh")[..900].to_vec(), "byte 9"),
+        ("msh", read("binary_4.msh")[..900].to_vec(), "byte 899: the file ends too early"),
         ("msh", read("binary_2.msh")[..900].to_vec(), "the file ends too early"),
     ];
     for (ending, content, expected) in cases {

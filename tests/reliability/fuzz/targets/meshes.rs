@@ -5,11 +5,11 @@ use crate::objects;
 use haptize::{
     Error,
     object::Object,
+    robot::{self, Arm, Robot},
     scene::{
         ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Placement, Shape, SpringKind,
         SpringSpec,
     },
-    urdf::{self, Arm, Robot},
 };
 use std::path::Path;
 
@@ -192,7 +192,11 @@ pub const ROBOTS: Target = Target {
     seeds: || {
         let file = |name: &str| shipped(&format!("tests/robots/{name}"));
         let arm = String::from_utf8(file("arm.urdf")).unwrap();
-        vec![arm.replace("package://robots/meshes/tip.obj", "tip.obj").into_bytes(), file("finger.urdf")]
+        vec![
+            arm.replace("package://robots/meshes/tip.obj", "tip.obj").into_bytes(),
+            file("finger.urdf"),
+            file("crane.xml"),
+        ]
     },
     mutate: mutate::text,
     run: |file, input| {
@@ -213,7 +217,7 @@ fn imported(file: &Path) -> Result<String, Error> {
     let robot = Robot::load(file)?;
     let tip = robot.links.iter().rev().find(|link| link.name != "camera").map_or("none", |link| &link.name);
     let arm = Arm::new(&robot, tip, &[])?;
-    let nodes = urdf::sample(&robot, &arm, Some(0.02), None)?;
-    let (shapes, _) = urdf::drawn_shapes(&robot, &arm, None);
-    urdf::write_scene(&robot, &arm, &nodes, &shapes, "haptize import")
+    let nodes = robot::sample(&robot, &arm, Some(0.02), None)?;
+    let (shapes, _) = robot::drawn_shapes(&robot, &arm, None);
+    robot::write_scene(&robot, &arm, &nodes, &shapes, "haptize import")
 }

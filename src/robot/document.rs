@@ -61,28 +61,33 @@ impl<'a> Source<'a> {
         Ok(text)
     }
 
-    /// Returns an attribute as N numbers, `None` if it is missing.
-    pub fn numbers<const N: usize>(&self, node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>, Error> {
+    /// Returns an attribute as numbers, `None` if it is missing.
+    pub fn list(&self, node: Node<'_, '_>, name: &str) -> Result<Option<Vec<f64>>, Error> {
         let Some(attribute) = node.attribute_node(name) else { return Ok(None) };
         let text = attribute.value();
         let bad = |message: String| self.error(attribute.range(), message);
         if text.contains("${") || text.contains("$(") {
             return Err(bad(format!("{text:?} is an expression of xacro: {XACRO}")));
         }
-        let mut numbers = [0.0_f64; N];
-        let mut words = text.split_ascii_whitespace();
-        for number in &mut numbers {
-            let word = words.next().ok_or_else(|| bad(format!("{name} must be {N} numbers separated by blanks")))?;
-            *number = word.parse().map_err(|_| bad(format!("{name} has {word:?}, which is no number")))?;
+        let number = |word: &str| {
+            let number: f64 = word.parse().map_err(|_| bad(format!("{name} has {word:?}, which is no number")))?;
             let in_range = number.abs() <= LARGEST;
-            if !in_range {
-                return Err(bad(format!("{name} has {word}: a robot in SI units has no number above {LARGEST:.0e}")));
+            if in_range {
+                return Ok(number);
             }
-        }
-        if words.next().is_some() {
-            return Err(bad(format!("{name} must be {N} numbers, and there are more")));
-        }
-        Ok(Some(numbers))
+            Err(bad(format!("{name} has {word}: a robot in SI units has no number above {LARGEST:.0e}")))
+        };
+        text.split_ascii_whitespace().map(number).collect::<Result<_, _>>().map(Some)
+    }
+
+    /// Returns an attribute as N numbers, `None` if it is missing.
+    pub fn numbers<const N: usize>(&self, node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>, Error> {
+        let Some(list) = self.list(node, name)? else { return Ok(None) };
+        let place = node.attribute_node(name).map_or(node.range(), |attribute| attribute.range());
+        let count = list.len();
+        list.try_into().map(Some).map_err(|_| {
+            self.error(place, format!("{name} must be {N} numbers separated by blanks, and there are {count}"))
+        })
     }
 
     /// Returns an attribute as a number, `None` if it is missing.

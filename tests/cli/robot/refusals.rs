@@ -1,7 +1,7 @@
 //! Files and requests that are refused, with the place and the remedy.
 
 use super::{arm, file};
-use haptize::urdf::{Robot, sample};
+use haptize::robot::{Robot, sample};
 
 /// The robot that the cases below alter.
 const PLAIN: &str = r#"<robot name="plain">
@@ -43,7 +43,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("revolute", "ball", 5, &["\"ball\"", "revolute"]),
     ("xyz=\"0 1 0\"", "xyz=\"0 0 0\"", 5, &["axis zero"]),
     ("xyz=\"0 1 0\"", "xyz=\"0 1\"", 6, &["3 numbers"]),
-    ("xyz=\"0 1 0\"", "xyz=\"0 1 0 0\"", 6, &["there are more"]),
+    ("xyz=\"0 1 0\"", "xyz=\"0 1 0 0\"", 6, &["there are 4"]),
     ("<child link=\"arm\"/>", "<child link=\"leg\"/>", 6, &["no link \"leg\""]),
     ("<parent link=\"base\"/>", "", 5, &["<parent"]),
     ("<parent link=\"base\"/>", "<parent link=\"hand\"/>", 8, &["circle"]),
@@ -98,7 +98,8 @@ fn what_no_scene_can_hold_is_refused_at_its_line() {
 #[test]
 fn other_files_are_told_apart() {
     let error = |text: &str| Robot::parse(text.into(), "model.xml").unwrap_err().to_string();
-    assert!(error("<mujoco model=\"x\"/>").contains("<mujoco>"));
+    assert!(error("<sdf version=\"1.9\"/>").contains("<sdf>"));
+    assert!(error("<mujoco model=\"x\"/>").contains("no <worldbody>"));
     assert!(error("").contains("not well-formed"));
     let xacro = Robot::parse(PLAIN.into(), "plain.urdf.xacro").unwrap_err().to_string();
     assert!(xacro.contains("pip install xacro"), "{xacro}");
@@ -186,8 +187,8 @@ fn a_mesh_in_millimetres_is_told_with_its_length_and_scale() {
     let text = PLAIN.replace("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"plate.obj\"/>");
     let told = |text: &str, spacing: f64| {
         let robot = Robot::parse(text.to_owned(), folder.path().join("robot.urdf")).unwrap();
-        let arm = haptize::urdf::Arm::new(&robot, "hand", &[]).unwrap();
-        let notes = haptize::urdf::drawn_shapes(&robot, &arm, None).1;
+        let arm = haptize::robot::Arm::new(&robot, "hand", &[]).unwrap();
+        let notes = haptize::robot::drawn_shapes(&robot, &arm, None).1;
         (sample(&robot, &arm, Some(spacing), None).map(|nodes| nodes.spacing).map_err(|error| error.to_string()), notes)
     };
     let (refused, notes) = told(&text, 0.005);

@@ -23,6 +23,7 @@ impl Surface {
             Geometry::Box(size) => Self::from(proxy::block(*size)),
             Geometry::Cylinder { radius, length } => Self::from(proxy::cylinder(*radius, *length)),
             Geometry::Sphere(radius) => Self::from(proxy::sphere(*radius)),
+            Geometry::Capsule { radius, length } => Self::from(proxy::capsule(*radius, *length)),
             Geometry::Mesh { file, scale } => {
                 let file = package::resolve(file, source.path, packages).map_err(refuse)?;
                 // Merged nodes and dropped faces change no surface.

@@ -5,8 +5,8 @@ use glam::{DMat3, DVec3};
 use haptize::{
     JointVector,
     proxy::{Chain, Pose},
+    robot::{Arm, Geometry, Note, sample, write_scene},
     scene::{JointKind, Scene},
-    urdf::{Arm, Geometry, Note, sample, write_scene},
 };
 use std::f64::consts::FRAC_PI_2;
 
@@ -125,16 +125,23 @@ fn kinetic_energy_is_that_of_the_files_links() {
 
 #[test]
 fn contact_nodes_lie_on_the_shapes() {
-    let (robot, arm) = arm(&std::fs::read_to_string(file("arm.urdf")).unwrap(), "probe", &[]).unwrap();
-    let nodes = sample(&robot, &arm, Some(0.006), None).unwrap();
-    assert!(
-        nodes.of_joints.iter().all(|nodes| nodes.len() > 10),
-        "{:?}",
-        nodes.of_joints.iter().map(Vec::len).collect::<Vec<_>>()
-    );
-    for (joint, nodes) in arm.joints.iter().zip(&nodes.of_joints) {
+    let read = |name: &str| std::fs::read_to_string(file(name)).unwrap();
+    let arms = [
+        arm(&read("arm.urdf"), "probe", &[]).unwrap(),
+        arm(&read("crane.xml"), "hand", &[("yaw", 0.0), ("finger", 0.01)]).unwrap(),
+    ];
+    for (robot, arm) in arms {
+        let nodes = sample(&robot, &arm, Some(0.006), None).unwrap();
+        let counts: Vec<usize> = nodes.of_joints.iter().map(Vec::len).collect();
+        assert!(counts.iter().all(|count| *count > 10), "{counts:?}");
+        lie_on_the_shapes(&arm, &nodes.of_joints);
+    }
+}
+
+fn lie_on_the_shapes(arm: &Arm, of_joints: &[Vec<DVec3>]) {
+    for (joint, nodes) in arm.joints.iter().zip(of_joints) {
         for node in nodes {
-            let off = |shape: &haptize::urdf::Placed| {
+            let off = |shape: &haptize::robot::Placed| {
                 let x = shape.place.inverse().transform_point3(*node);
                 match &shape.geometry {
                     Geometry::Box(size) => {
@@ -142,6 +149,10 @@ fn contact_nodes_lie_on_the_shapes() {
                         d.max(DVec3::ZERO).length() + d.max_element().min(0.0)
                     }
                     Geometry::Sphere(radius) => x.length() - radius,
+                    Geometry::Capsule { radius, length } => {
+                        let half = 0.5 * length;
+                        (x - x.z.clamp(-half, half) * DVec3::Z).length() - radius
+                    }
                     Geometry::Cylinder { radius, length } => {
                         let d = glam::DVec2::new(x.truncate().length() - radius, x.z.abs() - 0.5 * length);
                         d.max(glam::DVec2::ZERO).length() + d.max_element().min(0.0)
