@@ -141,8 +141,8 @@ impl Joint {
         }
     }
 
-    /// Returns the motion of its child where it has the coordinate `value` (rad or m); `None` if it has no coordinate, or
-    /// more than one.
+    /// Returns the motion of its child where it has the coordinate `value` (rad or m); `None` if it has no coordinate,
+    /// or more than one.
     #[must_use]
     pub fn motion(&self, value: f64) -> Option<DAffine3> {
         match self.kind {

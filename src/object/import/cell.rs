@@ -178,16 +178,7 @@ impl CellType {
         match self.form {
             Form::Other => Parts::None,
             Form::Face => Parts::Faces(vec![nodes.to_vec()]),
-            // Every second triangle of a strip is turned round.
-            Form::Strip => Parts::Faces(
-                (nodes.windows(3).enumerate())
-                    .map(
-                        |(k, corners)| {
-                            if k % 2 == 0 { corners.to_vec() } else { vec![corners[1], corners[0], corners[2]] }
-                        },
-                    )
-                    .collect(),
-            ),
+            Form::Strip => Parts::Faces(strip(nodes)),
             Form::Volume(shape) => Parts::Tetrahedra(shape.tetrahedra(nodes)),
         }
     }
@@ -224,4 +215,15 @@ impl CellType {
         let sum = corners.chain(inner.map(|(edge, _)| (nodes[first + edge], weight))).collect();
         Middle::Sum(ends.map(|end| nodes[end]), sum)
     }
+}
+
+/// The triangles of a strip, each of which shares two corners with the one before: every second one is turned round.
+pub(super) fn strip(corners: &[u32]) -> Vec<Vec<u32>> {
+    let triangle = |(k, c): (usize, &[u32])| if k % 2 == 0 { c.to_vec() } else { vec![c[1], c[0], c[2]] };
+    corners.windows(3).enumerate().map(triangle).collect()
+}
+
+/// The triangles of a fan, which share their first corner.
+pub(super) fn fan(corners: &[u32]) -> Vec<Vec<u32>> {
+    corners.windows(2).skip(1).map(|pair| vec![corners[0], pair[0], pair[1]]).collect()
 }

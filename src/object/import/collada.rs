@@ -3,11 +3,18 @@
 //! Read are the faces of the scene, at the places of their nodes, in the file's unit. Coordinates stay as they are
 //! whichever axis points up, as in RViz and in trimesh; materials, lights, cameras and animations are left out.
 
-use super::{cell::CellType, elements::Elements, vtk};
+use super::{
+    cell::{fan, strip},
+    elements::Elements,
+};
 use crate::xml;
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
+
+/// What a file says that names the same parts again and again.
+const REPEATED: &str =
+    "parts are repeated so often that they have more corners than the file has bytes: join them into one mesh";
 
 /// Reads a file.
 pub(super) fn read(bytes: &[u8], elements: &mut Elements<'_>) -> Result<(), String> {
@@ -22,7 +29,7 @@ pub(super) fn read(bytes: &[u8], elements: &mut Elements<'_>) -> Result<(), Stri
     let unit =
         unit.ok().filter(|unit| unit.is_finite() && *unit > 0.0).ok_or("its unit is no length: export it again")?;
     let ids = document.descendants().filter_map(|node| Some((node.attribute("id")?, node))).collect();
-    let mut reader = Reader { text: &text, ids, elements, corners: 0 };
+    let mut reader = Reader { text: &text, ids, elements };
     reader.scene(&document, DAffine3::from_scale(DVec3::splat(unit)))
 }
 
@@ -41,8 +48,6 @@ struct Reader<'a, 'b, 'c> {
     /// Elements by their `id`.
     ids: HashMap<&'a str, Node<'a, 'a>>,
     elements: &'b mut Elements<'c>,
-    /// Corners of faces so far: at most as many as the file has bytes.
-    corners: usize,
 }
 
 impl<'a> Reader<'a, '_, '_> {
@@ -148,6 +153,9 @@ impl<'a> Reader<'a, '_, '_> {
                 None => {
                     let first = super::node_number(self.elements.nodes.len())?;
                     let positions = self.positions(vertices)?;
+                    if self.elements.nodes.len() + positions.len() > self.text.len() {
+                        return Err(self.error(primitive, REPEATED));
+                    }
                     self.elements.nodes.extend(positions.into_iter().map(|node| place.transform_point3(node)));
                     *first_nodes.entry(source).or_insert(first)
                 }
@@ -161,11 +169,8 @@ impl<'a> Reader<'a, '_, '_> {
                 let corners: Option<Vec<u32>> =
                     numbers.iter().skip(at).step_by(stride).map(|corner| first.checked_add(*corner)).collect();
                 let corners = corners.ok_or_else(|| self.error(list, "a face names a node that is not there"))?;
-                self.corners += corners.len();
-                if self.corners > self.text.len() {
-                    let what = "parts are repeated so often that they have more corners than the file has bytes: join \
-                                them into one mesh";
-                    return Err(self.error(list, what));
+                if self.elements.corners_of_faces() + corners.len() > self.text.len() {
+                    return Err(self.error(list, REPEATED));
                 }
                 for mut face in faces(kind, corners, &lengths)
                     .ok_or_else(|| self.error(list, "faces have more corners than are there: export the mesh again"))?
@@ -173,8 +178,7 @@ impl<'a> Reader<'a, '_, '_> {
                     if is_mirrored {
                         face.reverse();
                     }
-                    let Some(polygon) = CellType::of_vtk(vtk::POLYGON) else { continue };
-                    self.elements.add(polygon, &face, 0).map_err(|reason| self.error(list, &reason))?;
+                    self.elements.add_face(&face).map_err(|reason| self.error(list, &reason))?;
                 }
             }
         }
@@ -215,10 +219,7 @@ fn faces(kind: &str, corners: Vec<u32>, lengths: &[usize]) -> Option<Vec<Vec<u32
             };
             lengths.iter().map(&mut face).collect::<Option<_>>()?
         }
-        "tristrips" => {
-            let turned = |(k, c): (usize, &[u32])| if k % 2 == 0 { c.to_vec() } else { vec![c[1], c[0], c[2]] };
-            corners.windows(3).enumerate().map(turned).collect()
-        }
-        _ => corners.windows(2).skip(1).map(|pair| vec![corners[0], pair[0], pair[1]]).collect(),
+        "tristrips" => strip(&corners),
+        _ => fan(&corners),
     })
 }

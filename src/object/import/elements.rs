@@ -53,20 +53,36 @@ impl<'a> Elements<'a> {
         if let Some(count) = of.nodes.filter(|count| *count != nodes.len()) {
             return Err(format!("one of the {} has {} nodes and must have {count}", of.name, nodes.len()));
         }
-        if let Some(node) = nodes.iter().find(|node| **node as usize >= self.nodes.len()) {
-            return Err(format!("there is no node {node}, counted from 0, of {}", self.nodes.len()));
-        }
+        self.check(nodes)?;
         match of.parts(nodes) {
             Parts::None => self.leave_out(of.name.to_owned(), false),
-            Parts::Faces(faces) => faces.iter().for_each(|face| {
-                self.face_corners.extend(face);
-                self.face_ends.push(self.face_corners.len());
-            }),
+            Parts::Faces(faces) => faces.iter().try_for_each(|face| self.add_face(face))?,
             Parts::Tetrahedra(all) => {
                 all.into_iter().for_each(|corners| self.add_tetrahedron(of, nodes, corners, region))
             }
         }
         Ok(())
+    }
+
+    /// Adds a face between `corners`, nodes that are there already.
+    pub fn add_face(&mut self, corners: &[u32]) -> Result<(), String> {
+        self.check(corners)?;
+        self.face_corners.extend(corners);
+        self.face_ends.push(self.face_corners.len());
+        Ok(())
+    }
+
+    /// Corners of all faces so far.
+    pub fn corners_of_faces(&self) -> usize {
+        self.face_corners.len()
+    }
+
+    /// Refuses nodes that are not there.
+    fn check(&self, nodes: &[u32]) -> Result<(), String> {
+        match nodes.iter().find(|node| **node as usize >= self.nodes.len()) {
+            Some(node) => Err(format!("there is no node {node}, counted from 0, of {}", self.nodes.len())),
+            None => Ok(()),
+        }
     }
 
     /// Adds the tetrahedron between `corners` of a cell.
@@ -128,8 +144,8 @@ impl<'a> Elements<'a> {
         if self.face_ends.is_empty() {
             let only = if others.is_empty() { String::new() } else { format!(", but {}", listed(others)) };
             return Err(format!(
-                "it has no triangles, tetrahedra, hexahedra, prisms or pyramids{only}: mesh the volume (in Gmsh: -3 -order 2); \
-                 where there are physical groups, Gmsh saves only what is in one"
+                "it has no triangles, tetrahedra, hexahedra, prisms or pyramids{only}: mesh the volume (in Gmsh: -3 \
+                 -order 2); where there are physical groups, Gmsh saves only what is in one"
             ));
         }
         self.surface()

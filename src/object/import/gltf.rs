@@ -4,9 +4,11 @@
 //! left out. glTF's y points up; here z does, so that what Blender exports comes back as it was drawn.
 
 use super::{
-    Input, Mesh, check_coordinates, node_number,
-    numbers::NumberType,
-    numbers::{Encoding, Numbers},
+    Input, Mesh,
+    cell::{fan, strip},
+    elements::Elements,
+    node_number,
+    numbers::{Encoding, NumberType, Numbers},
     open,
 };
 use base64::{Engine as _, engine::general_purpose::STANDARD};
@@ -26,9 +28,6 @@ const HARMLESS: [&str; 5] = ["KHR_mesh_quantization", "KHR_materials", "KHR_text
 const TRIANGLES: u32 = 4;
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
-
-/// Most nodes between a root and a leaf: the depth of a hand-made scene is a tenth.
-const MAX_DEPTH: usize = 1000;
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -145,7 +144,7 @@ pub(super) fn read(input: &mut Input<'_>) -> Result<Mesh, String> {
         document.buffers.iter().map(|buffer| content(buffer, own, input)).collect();
     let buffers = buffers?;
     let most = bytes.len() + buffers.iter().map(Vec::len).sum::<usize>();
-    let mut scene = Reader { document: &document, buffers: &buffers, most, nodes: Vec::new(), triangles: Vec::new() };
+    let mut scene = Reader { document: &document, buffers: &buffers, most, elements: Elements::new(&[]) };
     // Without a scene all nodes that are no one's children are there.
     let roots = match document.scenes.get(document.scene.unwrap_or(0)) {
         Some(scene) => scene.nodes.clone(),
@@ -159,12 +158,10 @@ pub(super) fn read(input: &mut Input<'_>) -> Result<Mesh, String> {
     };
     let upright = DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y));
     scene.walk(&roots, upright)?;
-    let Reader { nodes, triangles, .. } = scene;
-    if triangles.is_empty() {
+    if scene.elements.corners_of_faces() == 0 {
         return Err("it has no triangles in its scene: export the mesh again".to_owned());
     }
-    check_coordinates(&nodes)?;
-    Ok(Mesh::from((nodes, triangles)))
+    scene.elements.mesh()
 }
 
 /// The text of a binary file, and its bytes: parts of a length, a kind and as many bytes.
@@ -213,22 +210,18 @@ struct Reader<'a> {
     buffers: &'a [Vec<u8>],
     /// Most corners of triangles: the bytes of all files.
     most: usize,
-    nodes: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    elements: Elements<'a>,
 }
 
 impl Reader<'_> {
     /// Adds the meshes of `roots` and of all below them, whose parent is at `place`.
     fn walk(&mut self, roots: &[usize], place: DAffine3) -> Result<(), String> {
         let mut is_known = vec![false; self.document.nodes.len()];
-        let mut open: Vec<(usize, DAffine3, usize)> = roots.iter().rev().map(|&root| (root, place, 0)).collect();
-        while let Some((number, place, depth)) = open.pop() {
-            let node = self
-                .document
-                .nodes
-                .get(number)
-                .ok_or_else(|| format!("there is no node {number}: export the mesh again"))?;
-            if std::mem::replace(&mut is_known[number], true) || depth > MAX_DEPTH {
+        let mut open: Vec<(usize, DAffine3)> = roots.iter().rev().map(|&root| (root, place)).collect();
+        while let Some((number, place)) = open.pop() {
+            let node = self.document.nodes.get(number);
+            let node = node.ok_or_else(|| format!("there is no node {number}: export the mesh again"))?;
+            if std::mem::replace(&mut is_known[number], true) {
                 return Err(format!("node {number} has two parents: export the mesh again"));
             }
             let place = place * node.place();
@@ -236,16 +229,13 @@ impl Reader<'_> {
                 if node.skin.is_some() {
                     return Err(format!("a skeleton bends the mesh of node {number}: apply it before the export"));
                 }
-                let mesh = self
-                    .document
-                    .meshes
-                    .get(mesh)
-                    .ok_or_else(|| format!("there is no mesh {mesh}: export it again"))?;
+                let primitives = self.document.meshes.get(mesh);
+                let mesh = primitives.ok_or_else(|| format!("there is no mesh {mesh}: export it again"))?;
                 for primitive in &mesh.primitives {
                     self.add(primitive, place).map_err(|reason| format!("node {number}: {reason}"))?;
                 }
             }
-            open.extend(node.children.iter().rev().map(|&child| (child, place, depth + 1)));
+            open.extend(node.children.iter().rev().map(|&child| (child, place)));
         }
         Ok(())
     }
@@ -256,7 +246,7 @@ impl Reader<'_> {
         let (Some(position), TRIANGLES | STRIP | FAN) = (primitive.attributes.position, mode) else { return Ok(()) };
         let positions = self.numbers(position, "VEC3")?;
         let count = node_number(positions.len() / 3)?;
-        let first = node_number(self.nodes.len())?;
+        let first = node_number(self.elements.nodes.len())?;
         let corners: Vec<u32> = match primitive.indices {
             Some(indices) => self.numbers(indices, "SCALAR")?.into_iter().map(|number| number as u32).collect(),
             None => (0..count).collect(),
@@ -264,23 +254,27 @@ impl Reader<'_> {
         if let Some(corner) = corners.iter().find(|corner| **corner >= count) {
             return Err(format!("a triangle names node {corner}, counted from 0, of {count}: export the mesh again"));
         }
-        if 3 * self.triangles.len() + 3 * corners.len() + self.nodes.len() > self.most {
-            return Err("its parts are repeated so often that they have more corners than the file has bytes: join them into one \
-                        mesh".to_owned());
+        if self.elements.corners_of_faces() + self.elements.nodes.len() + corners.len() > self.most {
+            let reason = "its parts are repeated so often that they have more corners than the file has bytes: join them \
+                          into one mesh";
+            return Err(reason.to_owned());
         }
+        let place_of = |at: &[f64]| place.transform_point3(DVec3::from_slice(at));
+        self.elements.nodes.extend(positions.chunks_exact(3).map(place_of));
+        let faces = match mode {
+            TRIANGLES => corners.chunks_exact(3).map(<[u32]>::to_vec).collect(),
+            STRIP => strip(&corners),
+            _ => fan(&corners),
+        };
         // A mirrored part is turned inside out again.
         let is_mirrored = place.matrix3.determinant() < 0.0;
-        let triangle = |k: usize, of: [usize; 3]| {
-            let [a, b, c] = of.map(|corner| first + corners[corner]);
-            if is_mirrored != (mode == STRIP && k % 2 == 1) { [b, a, c] } else { [a, b, c] }
-        };
-        self.triangles.extend(match mode {
-            TRIANGLES => (0..corners.len() / 3).map(|k| triangle(k, [3 * k, 3 * k + 1, 3 * k + 2])).collect::<Vec<_>>(),
-            STRIP => (0..corners.len().saturating_sub(2)).map(|k| triangle(k, [k, k + 1, k + 2])).collect(),
-            _ => (0..corners.len().saturating_sub(2)).map(|k| triangle(k, [0, k + 1, k + 2])).collect(),
-        });
-        self.nodes.extend(positions.chunks_exact(3).map(|at| place.transform_point3(DVec3::from_slice(at))));
-        Ok(())
+        faces.into_iter().try_for_each(|mut face| {
+            face.iter_mut().for_each(|corner| *corner += first);
+            if is_mirrored {
+                face.reverse();
+            }
+            self.elements.add_face(&face)
+        })
     }
 
     /// The numbers of an accessor, whose elements are of the type `of`.

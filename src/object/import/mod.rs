@@ -159,8 +159,8 @@ pub(super) fn read_tetrahedra(
     let body = read_body(file, placement, wanted, warnings)?;
     if body.tetrahedra.is_empty() {
         let reason = format!(
-            "it has no tetrahedra, hexahedra, prisms or pyramids, but {}: mesh the volume (in Gmsh: -3 -order 2), or give \
-             the surface as [object.mesh]",
+            "it has no tetrahedra, hexahedra, prisms or pyramids, but {}: mesh the volume (in Gmsh: -3 -order 2), or \
+             give the surface as [object.mesh]",
             counted(body.triangles.len(), ["triangle", "triangles"])
         );
         return Err(unreadable(file, &reason));

@@ -36,7 +36,8 @@ pub(super) fn read(bytes: &[u8], elements: &mut Elements<'_>) -> Result<(), Stri
                 let kind = reader.file.word().unwrap_or_default().to_uppercase();
                 if !["POLYDATA", "UNSTRUCTURED_GRID"].contains(&kind.as_str()) {
                     return Err(reader.file.error(
-                        "only POLYDATA and UNSTRUCTURED_GRID are read: extract a surface or tetrahedra (ParaView, PyVista)",
+                        "only POLYDATA and UNSTRUCTURED_GRID are read: extract a surface or tetrahedra (ParaView, \
+                         PyVista)",
                     ));
                 }
             }
