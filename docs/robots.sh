@@ -36,8 +36,11 @@ LBR iiwa|$mjcf/iiwa/robot.xml|right_hand|joint_7=0
 Kinova Gen3|$mjcf/kinova3/robot.xml|right_hand|Actuator7=0
 UR5e|$mjcf/ur5e/robot.xml|right_hand|"
 
-# The value of a key in the report of a command, as it is or in other digits.
-field() { python3 -c 'import json, sys; print(f"{json.load(open(sys.argv[1]))[sys.argv[2]]:{sys.argv[3]}}")' "$1.json" "$2" "${3:-}"; }
+# The value of a key in the report of a command, as it is or in other digits; a dash where there is none.
+field() {
+    python3 -c 'import json, sys; print(f"{json.load(open(sys.argv[1]))[sys.argv[2]]:{sys.argv[3]}}")' \
+        "$1.json" "$2" "${3:-}" 2>/dev/null || echo "-"
+}
 
 echo "| robot | format | joints | contact nodes | contact within the limits | points, in contact | not converged | torque (N m) |"
 echo "|---|---|---|---|---|---|---|---|"
@@ -53,7 +56,7 @@ while IFS='|' read -r name file tip held; do
         continue
     fi
     read -r joints nodes < <(python3 -c 'import json; i = json.load(open("import.json")); print(len(i["joints"]), sum(i["nodes"]))')
-    "$haptize" reach "$scene" --json >reach.json 2>>"$log" || true
+    timeout -s INT 120 "$haptize" reach "$scene" --json >reach.json 2>>"$log" || true
     "$haptize" bake "$scene" --backend cpu --force --json -o "robot$number.haptize" >bake.json 2>>"$log"
     "$haptize" play "robot$number.haptize" --json >play.json 2>>"$log"
     echo "| $name | $format | $joints | $nodes | $(field reach volume .1%) | $(field bake points), $(field bake contact_points) |" \
