@@ -141,7 +141,6 @@ pub const COLLADA: Target = Target {
     mutate: mutate::text,
     run: GLTF.run,
     kinds: 12,
-    ..MSH
 };
 
 pub const VTK: Target = Target {
@@ -183,7 +182,6 @@ pub const TETGEN: Target = Target {
         mesh(file, input.get(place + NEXT.len()..).unwrap_or_default(), None, SOLID)
     },
     kinds: 12,
-    ..MSH
 };
 
 pub const ROBOTS: Target = Target {
