@@ -2,7 +2,7 @@
 //! solved beforehand for every joint configuration, and felt at 1 kHz by interpolation.
 //!
 //! A [`scene`] says what is touched with what. An [`object`] deforms, a [`proxy`] moves its joints (it may come from a
-//! robot's file, [`urdf`]), and their equilibrium ([`contact`]) at every point of a grid over the joint angles q gives
+//! robot's file, [`robot`]), and their equilibrium ([`contact`]) at every point of a grid over the joint angles q gives
 //! a [`dataset`] ([`sweep`], on the CPU or through [`gpu`]): the joint torque tau(q), the stored energy U(q) and the
 //! contact forces. [`render`] looks torques up in it, a thousand times a second, for the hand or log that [`device`]
 //! stands for; [`report`] draws what came out. Data flows one way: a room knows only the rooms above it in the list
@@ -74,7 +74,7 @@ pub mod proxy;
 pub mod contact;
 
 pub mod gpu;
-pub mod urdf;
+pub mod robot;
 
 pub mod dataset;
 pub use dataset::store;
@@ -120,6 +120,7 @@ pub mod memory;
 mod names;
 mod random;
 mod toml_text;
+mod xml;
 
 pub(crate) use error::error;
 pub use error::{Error, ErrorKind, Location};

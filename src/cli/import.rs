@@ -8,7 +8,7 @@ use super::{
 use crate::MAX_AXES;
 use crate::dataset::replace_file;
 use crate::names::{counted, escaped};
-use crate::urdf::{self, Arm, ArmJoint, Lock, Robot};
+use crate::robot::{self, Arm, ArmJoint, Lock, Robot};
 use serde::{Serialize, Serializer};
 use std::{
     fs::OpenOptions,
@@ -21,11 +21,12 @@ use std::{
 #[command(after_help = "\
 Examples:
   haptize import panda.urdf --tip panda_hand --lock panda_joint7=0.8
+  haptize import sawyer/robot.xml --tip right_hand --lock right_j6=0
   haptize import arm.urdf --tip wrist --spacing 0.01 --package-path ~/ros/src -o arm.toml")]
 pub struct Arguments {
-    /// The robot's file, URDF. Xacro is expanded first: `xacro FILE > ROBOT.urdf`.
+    /// The robot's file, URDF or MJCF. Xacro is expanded first: `xacro FILE > ROBOT.urdf`.
     robot: PathBuf,
-    /// The link at the end of the arm; its chain to the root becomes the arm.
+    /// The link (in MJCF the body) at the end of the arm; its chain to the root becomes the arm.
     #[arg(long, value_name = "LINK")]
     tip: String,
     /// Hold a joint at a value (rad or m); a scene has at most twelve that move, and six if it is to be baked. May be
@@ -59,10 +60,10 @@ fn lock(text: &str) -> Result<Lock, String> {
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let robot = Robot::load(&arguments.robot)?;
     let mut arm = Arm::new(&robot, &arguments.tip, &arguments.lock)?;
-    let nodes = urdf::sample(&robot, &arm, arguments.spacing, arguments.package_path.as_deref())?;
-    let (shapes, missing) = urdf::drawn_shapes(&robot, &arm, arguments.package_path.as_deref());
+    let nodes = robot::sample(&robot, &arm, arguments.spacing, arguments.package_path.as_deref())?;
+    let (shapes, missing) = robot::drawn_shapes(&robot, &arm, arguments.package_path.as_deref());
     arm.notes.extend(missing);
-    let scene = urdf::write_scene(&robot, &arm, &nodes, &shapes, &command(arguments))?;
+    let scene = robot::write_scene(&robot, &arm, &nodes, &shapes, &command(arguments))?;
     let output = match &arguments.output {
         Some(output) => output.clone(),
         None => PathBuf::from(arguments.robot.file_name().ok_or("the robot's path names no file; give -o")?)

@@ -9,7 +9,7 @@ use crate::{
     ErrorKind,
     dataset::{Axis, Dataset, Provenance, Refinement, StatusCounts, Summary},
     names::{counted, escaped},
-    object::{MeshSummary, Skin},
+    object::{MeshSummary, Skin, mesh_endings},
     scene::{Material, ObjectSpec, Rendering, SkinSpec},
     toml_text::{coarse, list, number, significant},
 };
@@ -25,7 +25,7 @@ Examples:
   haptize info sphere.haptize --json
   haptize info organ.obj")]
 pub struct Arguments {
-    /// A dataset, or the file of a mesh: OBJ, STL, PLY or MSH.
+    /// A dataset, or the file of a mesh: OBJ, STL, PLY, glTF, Gmsh, VTK, TetGen or MEDIT.
     #[arg(value_name = "FILE")]
     path: PathBuf,
 }
@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         return Report::of(&mesh, mesh.mesh.defect.is_none());
     }
     let dataset = Dataset::open(path).map_err(|error| match error.kind() {
-        ErrorKind::Foreign => format!("{error}, or a mesh whose name ends in .obj, .stl, .ply or .msh").into(),
+        ErrorKind::Foreign => format!("{error}, or a mesh whose name ends in {}", mesh_endings()).into(),
         _ => Failure::from(error),
     })?;
     let spec = Rendering::parse(&dataset.scene, "scene").ok().and_then(|scene| scene.object);

@@ -137,7 +137,7 @@ commands! {
     Export: export;
     /// Interpolate scattered measurements onto a grid: a scan's log, or tables of joint positions and torques.
     Gridize: gridize;
-    /// Turn a robot file (URDF) into a scene: its joints, inertias and shapes, before a soft ball.
+    /// Turn a robot file (URDF, MJCF) into a scene: its joints, inertias and shapes, before a soft ball.
     Import: import;
     /// Check a dataset and summarise it.
     Info: info;

@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Move the object before the tip of the arm, instead of the tip before the object.
     #[arg(long = "move", conflicts_with = "at")]
     moves: bool,
-    /// Take the closed surface in this file (OBJ, STL or PLY) for the object, an elastic solid under a skin, and move
+    /// Take the closed surface in this file (OBJ, STL, PLY, glTF or another mesh) for the object, an elastic solid under a skin, and move
     /// it before the tip.
     #[arg(long, value_name = "FILE", conflicts_with = "at")]
     mesh: Option<PathBuf>,

@@ -1,13 +1,10 @@
 //! What a mesh file holds, before it is an object of a scene.
 
-use super::{Body, LengthUnit, import, topology};
+use super::{LengthUnit, import, topology};
 use crate::{Error, scene::Placement};
 use glam::DVec3;
 use serde::Serialize;
 use std::path::Path;
-
-/// Endings of files that are read as meshes.
-const ENDINGS: [&str; 4] = ["obj", "stl", "ply", "msh"];
 
 /// Longest body that is taken to be given in metres where no unit is named (m).
 const LONGEST: f64 = 2.0;
@@ -48,8 +45,7 @@ impl MeshSummary {
     /// Returns whether the name of `file` is that of a mesh.
     #[must_use]
     pub fn is_mesh(file: &Path) -> bool {
-        let ending = file.extension().map(|ending| ending.to_string_lossy().to_lowercase());
-        ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+        import::is_mesh(file)
     }
 
     /// Reads and checks the mesh in `file`.
@@ -58,12 +54,7 @@ impl MeshSummary {
     /// When it cannot be read.
     pub fn read(file: &Path) -> Result<Self, Error> {
         let mut warnings = Vec::new();
-        let is_volume = file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("msh"));
-        let mut body = if is_volume {
-            import::read_tetrahedra(file, &Placement::METRES, &[], &mut warnings)?
-        } else {
-            Body::shell(import::read_of_any_size(file, &Placement::METRES, &mut warnings)?)
-        };
+        let mut body = import::read_body(file, &Placement::METRES, &[], &mut warnings)?;
         let surface = &body.nodes[..body.surface_nodes];
         let closed = topology::close(surface, &mut body.triangles);
         let parts = closed.as_ref().map_or(0, |closed| closed.components.len());

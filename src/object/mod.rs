@@ -42,7 +42,7 @@ pub use compliance::Compliance;
 pub use draft::{Draft, LengthUnit};
 pub use factor::Factor;
 pub(crate) use icosphere::generate as icosphere;
-pub(crate) use import::{MOST_METRES, corners, length, read as read_surface};
+pub(crate) use import::{MOST_METRES, corners, endings as mesh_endings, length, read as read_surface};
 pub use lattice_error::LatticeError;
 pub use mechanics::Mechanics;
 pub use mesh_summary::MeshSummary;
@@ -133,9 +133,7 @@ impl Object {
                     InclusionPlace::Sphere { .. } => None,
                 };
                 let wanted: Vec<u32> = inclusions.iter().filter_map(region).collect();
-                let body = import::read_tetrahedra(file, placement, &wanted, &mut warnings)?;
-                warnings.extend(import::oversize(file, placement, &body.nodes));
-                body
+                import::read_tetrahedra(file, placement, &wanted, &mut warnings)?
             }
         };
         Self::assemble(spec, body, warnings)

@@ -71,6 +71,34 @@ pub fn sphere(radius: f64) -> Triangles {
     object::icosphere(DVec3::ZERO, radius, DIVISIONS).unwrap_or_default()
 }
 
+/// Returns a capsule about the origin, along z, `length` (m) between the middles of its spheres.
+#[must_use]
+pub fn capsule(radius: f64, length: f64) -> Triangles {
+    let half = SIDES / 4;
+    let mut nodes = [-1.0, 1.0].map(|end| end * (radius + 0.5 * length) * DVec3::Z).to_vec();
+    // Rings from pole to pole; both spheres have one at their equator.
+    for ring in 1..=2 * half {
+        let (step, end) =
+            if ring <= half { (ring as f64 - half as f64, -0.5) } else { ((ring - half - 1) as f64, 0.5) };
+        let (sin, cos) = (0.25 * TAU * step / half as f64).sin_cos();
+        for side in 0..SIDES {
+            let (y, x) = (TAU * side as f64 / SIDES as f64).sin_cos();
+            nodes.push(radius * DVec3::new(x * cos, y * cos, sin) + end * length * DVec3::Z);
+        }
+    }
+    let rim = |ring: usize, side: usize| (2 + ring * SIDES + side % SIDES) as u32;
+    let last = 2 * half - 1;
+    let triangles = (0..SIDES).flat_map(|side| {
+        let ends = [[0, rim(0, side + 1), rim(0, side)], [1, rim(last, side), rim(last, side + 1)]];
+        let sides = (0..last).flat_map(move |ring| {
+            let [a, b, c, d] = [rim(ring, side), rim(ring, side + 1), rim(ring + 1, side), rim(ring + 1, side + 1)];
+            [[a, b, d], [a, d, c]]
+        });
+        sides.chain(ends)
+    });
+    (nodes, triangles.collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,6 +118,9 @@ mod tests {
         let cylinder = cylinder(0.1, 0.5);
         assert!((area(&cylinder) / (TAU * 0.1 * 0.5 + TAU * 0.01) - 1.0).abs() < 2e-3);
         assert!((volume(&cylinder) / (0.5 * TAU * 0.01 * 0.5) - 1.0).abs() < 2e-3);
+        let capsule = capsule(0.1, 0.5);
+        assert!((area(&capsule) / (TAU * 0.1 * 0.5 + 2.0 * TAU * 0.01) - 1.0).abs() < 3e-3, "{}", area(&capsule));
+        assert!((volume(&capsule) / (0.5 * TAU * 0.01 * 0.5 + 2.0 / 3.0 * TAU * 1e-3) - 1.0).abs() < 4e-3);
         assert!((volume(&sphere(0.1)) / (2.0 / 3.0 * TAU * 1e-3) - 1.0).abs() < 2e-2);
     }
 }

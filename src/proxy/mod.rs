@@ -18,7 +18,7 @@ mod press;
 mod random;
 
 pub use chain::{Chain, Node, Pose};
-pub use drawn::{Triangles, block, cylinder, shape_frame, shape_triangles, sphere};
+pub use drawn::{Triangles, block, capsule, cylinder, shape_frame, shape_triangles, sphere};
 pub use dynamics::Dynamics;
 pub use links::Links;
 pub(crate) use posture::outer;

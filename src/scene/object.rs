@@ -60,7 +60,7 @@ pub enum Shape {
         /// Parts n of each edge of the icosahedron: 10 n^2 + 2 nodes.
         divisions: usize,
     },
-    /// A closed triangle mesh: OBJ, STL or PLY by the file's extension.
+    /// A closed triangle mesh, its format known by the file's extension.
     Mesh {
         /// Relative to the scene file's folder when the scene names it so; ready to open here.
         file: PathBuf,
@@ -69,7 +69,7 @@ pub enum Shape {
         /// Mean edge to which the surface is refined, where it is (m).
         refine: Option<f64>,
     },
-    /// The tetrahedra of a Gmsh file, whose surface is touched; otherwise as `Mesh`.
+    /// The tetrahedra of a file, whose surface is touched; otherwise as `Mesh`.
     Tetrahedra {
         /// See `Mesh`.
         file: PathBuf,
@@ -159,7 +159,7 @@ pub enum InclusionPlace {
         /// (m)
         radius: f64,
     },
-    /// The tetrahedra of a physical volume of the Gmsh file, by its number.
+    /// The tetrahedra of a region of the file, by its number: a physical volume in Gmsh.
     Region(u32),
 }
 
@@ -358,7 +358,7 @@ fn poisson<'de, T: From<f64>, D: Deserializer<'de>>(value: D) -> Result<T, D::Er
 fn file<'de, D: Deserializer<'de>>(value: D) -> Result<PathBuf, D::Error> {
     let file = PathBuf::deserialize(value)?;
     if file.as_os_str().is_empty() {
-        return Err(D::Error::custom(format!("{KEY}is empty: name an OBJ, STL, PLY or MSH file")));
+        return Err(D::Error::custom(format!("{KEY}is empty: name the file of a mesh")));
     }
     Ok(file)
 }
@@ -454,7 +454,7 @@ impl SphereTable {
 }
 
 impl ElasticityTable {
-    /// `is_solid`: whether the shape is the tetrahedra of a Gmsh file.
+    /// `is_solid`: whether the shape is the tetrahedra of a file.
     fn check(self, checker: &Checker<'_>, is_solid: bool) -> Result<ElasticSpec, Error> {
         let Self { young, poisson, cell, inclusion } = self;
         if cell.is_some() && is_solid {
@@ -466,7 +466,7 @@ impl ElasticityTable {
                 (Some(InclusionSphereTable { centre, radius }), None) => InclusionPlace::Sphere { centre, radius },
                 (None, Some(region)) if is_solid => InclusionPlace::Region(region),
                 (None, Some(_)) => {
-                    let message = "a region is a physical volume of a Gmsh file, and the object has none: give a \
+                    let message = "a region is a part of a solid's file, such as a physical volume of Gmsh, and the object has none: give a \
                                    sphere, or [object.tetrahedra]";
                     return at(".region", message);
                 }

@@ -11,5 +11,5 @@ mod device_scenes;
 mod docs;
 mod printed;
 mod report;
+mod robot;
 mod scene;
-mod urdf;

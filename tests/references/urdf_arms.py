@@ -8,11 +8,11 @@ Not part of the tests, since it needs packages and robots from elsewhere. Run it
 Robots from the package example-robot-data are taken (UR5, Panda, UR10), and any others that are named:
     ... urdf_arms.py ROBOT.urdf TIP [JOINT=VALUE ...] [-- ROBOT.urdf TIP ...]
 
-MuJoCo reads the same file without its shapes, whose meshes it may not know. Per robot and program: the largest distance between the
-tip's positions and the largest entry of the difference of its rotations, at 200 random configurations within the limits; from MuJoCo the
-largest difference of the inertia over its largest entry, from yourdfpy the largest distance of a contact node from the shapes that it
-places there, at the last of these. The scene's file has nine decimals of each length, five of a contact node's place, and six digits
-of each inertia.
+MuJoCo reads a URDF without its shapes, whose meshes it may not know; robots in MJCF are compared with MuJoCo alone. Per robot and
+program: the largest distance between the tip's positions and the largest entry of the difference of its rotations, at 200 random
+configurations within the limits; from MuJoCo the largest difference of the inertia over its largest entry, from yourdfpy the largest
+distance of a contact node from the shapes that it places there, at the last of these. The scene's file has nine decimals of each
+length, five of a contact node's place, and six digits of each inertia.
 """
 
 import json
@@ -110,7 +110,12 @@ class MuJoCo:
             return None
         full = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, full)
+        full -= np.diag(self.model.dof_armature)
         return full[np.ix_(self.degrees, self.degrees)]
+
+
+def is_mjcf(robot):
+    return pathlib.Path(robot).suffix == ".xml"
 
 
 def package(urdf):
@@ -168,6 +173,8 @@ def mesh_of(geometry, resolve):
 
 
 def bare(urdf):
+    if is_mjcf(urdf):
+        return mujoco.MjModel.from_xml_path(str(urdf))
     tree = ET.parse(urdf)
     root = tree.getroot()
     for link in root.iter("link"):
@@ -199,7 +206,7 @@ def compare(urdf, tip, locks):
     configurations = [random.uniform(low, high) for _ in range(CONFIGURATIONS)]
     count, fits = sum(report["nodes"]), True
     print(f"{pathlib.Path(urdf).name} {tip}: {len(joints)} joints, {count} nodes")
-    for program in (MuJoCo, Yourdfpy):
+    for program in (MuJoCo,) if is_mjcf(urdf) else (MuJoCo, Yourdfpy):
         peer = program(urdf, joints, held)
         worst = differences(arm, peer, tip, configurations)
         fits &= all(worst[key] <= LIMITS[key] for key in worst)

@@ -1,68 +1,201 @@
-//! Surfaces from mesh files (OBJ, STL and PLY, chosen by the file's extension), and tetrahedra from Gmsh files.
+//! Surfaces and solids from mesh files, whose format is known by the file's extension.
 //!
-//! Polygons are cut into triangles. Nodes at exactly the same point become one node (an STL file has no others),
-//! and faces that are left with fewer than three are dropped. Nodes keep the order of a PLY file; in OBJ and STL files
-//! they are numbered in the order in which triangles first name them, and nodes that no triangle names are dropped.
-//! Coordinates become `scale * coordinate + centre`.
+//! | file | subject |
+//! |---|---|
+//! | `obj.rs`, `stl.rs`, `ply.rs`, `gltf.rs`, `collada.rs` | formats of surfaces alone |
+//! | `msh.rs`, `medit.rs`, `tetgen.rs`, `vtk.rs`, `vtk_xml.rs` | formats of nodes and cells |
+//! | `elements.rs` | what becomes of these |
+//! | `cell.rs` | types of cells, and their division into tetrahedra |
+//! | `polygon.rs` | faces of many corners, cut into triangles |
+//! | `boundary.rs` | the surface of tetrahedra |
+//! | `numbers.rs`, `text.rs` | words, numbers and lines of a file |
+//!
+//! Polygons are cut into triangles. Nodes of a surface at exactly the same point become one node (an STL file has no
+//! others), and faces that are left with fewer than three are dropped. Where a file has tetrahedra, its surface is
+//! theirs. Nodes keep the order of the file; in OBJ and STL files they are numbered in the order in which triangles
+//! first name them. Nodes that nothing names are dropped, except in PLY files. Coordinates become `scale * coordinate +
+//! centre`.
 
 mod boundary;
-mod division;
+mod cell;
+mod collada;
+mod elements;
+mod gltf;
+mod medit;
 mod msh;
+mod numbers;
 mod obj;
 mod ply;
 mod polygon;
 mod stl;
+mod tetgen;
 mod text;
+mod vtk;
+mod vtk_xml;
 
 use super::{Body, out_of_range, topology::place};
 use crate::scene::Placement;
 use crate::{
     Error, ErrorKind,
     input::{self, GREATEST_INPUT},
+    names::counted,
 };
+use elements::Elements;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 /// Longest object that is meant in metres (m): what is longer was drawn in millimetres.
 pub(crate) const MOST_METRES: f64 = 10.0;
 
-/// Nodes and triangles as a reader finds them.
+/// Nodes and triangles of a surface.
 type Surface = (Vec<DVec3>, Vec<[u32; 3]>);
 
 /// Longest mesh file that is read (B): an object whose compliance fits in memory has less than a hundredth of that.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// Reads the surface in `file`; merged nodes are reported in `warnings`, and a scale that seems to be forgotten.
-pub(crate) fn read(file: &Path, placement: &Placement, warnings: &mut Vec<String>) -> Result<Surface, Error> {
-    let surface = read_of_any_size(file, placement, warnings)?;
-    warnings.extend(oversize(file, placement, &surface.0));
-    Ok(surface)
+/// What a reader finds: the triangles of a surface, or the tetrahedra of a solid.
+#[derive(Default)]
+struct Mesh {
+    nodes: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+    /// Corners of tetrahedra, of positive or negative volume.
+    tetrahedra: Vec<[u32; 4]>,
+    /// Nodes in the middles of their edges, in Gmsh's order; empty in first order.
+    mid_nodes: Vec<[u32; 6]>,
+    /// Region of each tetrahedron, 0 outside all; empty if the file names none.
+    regions: Vec<u32>,
 }
 
-/// As [`read`], of a file whose unit is not known.
-pub(super) fn read_of_any_size(
+impl From<Surface> for Mesh {
+    fn from((nodes, triangles): Surface) -> Self {
+        Self { nodes, triangles, ..Self::default() }
+    }
+}
+
+/// A file that is read.
+struct Input<'a> {
+    path: &'a Path,
+    stream: BufReader<File>,
+    /// Regions that the scene names, in its order.
+    wanted: &'a [u32],
+}
+
+impl Input<'_> {
+    /// All of the file.
+    fn bytes(&mut self) -> Result<Vec<u8>, String> {
+        let mut bytes = Vec::new();
+        self.stream.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+        Ok(bytes)
+    }
+
+    /// The mesh of a format of nodes and cells.
+    fn cells(&mut self, read: fn(&[u8], &mut Elements<'_>) -> Result<(), String>) -> Result<Mesh, String> {
+        let mut elements = Elements::new(self.wanted);
+        read(&self.bytes()?, &mut elements)?;
+        elements.mesh()
+    }
+}
+
+/// A format of mesh files.
+struct Format {
+    /// Extensions of its files.
+    endings: &'static [&'static str],
+    /// Whether its faces or their seams have nodes of their own, which then lie on one another.
+    is_soup: bool,
+    read: fn(&mut Input<'_>) -> Result<Mesh, String>,
+}
+
+/// Every format that is read.
+static FORMATS: [Format; 10] = [
+    Format { endings: &["obj"], is_soup: false, read: |input| obj::read(&mut input.stream).map(Mesh::from) },
+    Format { endings: &["stl"], is_soup: true, read: |input| stl::read(&mut input.stream).map(Mesh::from) },
+    Format { endings: &["ply"], is_soup: false, read: |input| ply::read(&mut input.stream).map(Mesh::from) },
+    Format { endings: &["glb", "gltf"], is_soup: true, read: gltf::read },
+    Format { endings: &["dae"], is_soup: true, read: |input| input.cells(collada::read) },
+    Format { endings: &["msh"], is_soup: false, read: |input| input.cells(msh::read) },
+    Format { endings: &["vtk"], is_soup: false, read: |input| input.cells(vtk::read) },
+    Format { endings: &["vtu", "vtp"], is_soup: false, read: |input| input.cells(vtk_xml::read) },
+    Format { endings: &["ele", "node"], is_soup: false, read: tetgen::read },
+    Format { endings: &["mesh"], is_soup: false, read: |input| input.cells(medit::read) },
+];
+
+/// The format of the file of this name.
+fn format(file: &Path) -> Option<&'static Format> {
+    let ending = file.extension()?.to_str()?.to_lowercase();
+    FORMATS.iter().find(|format| format.endings.contains(&ending.as_str()))
+}
+
+/// Whether the name of `file` is that of a mesh.
+pub(super) fn is_mesh(file: &Path) -> bool {
+    format(file).is_some()
+}
+
+/// The endings of mesh files, as a sentence lists them.
+pub(crate) fn endings() -> String {
+    let all: Vec<String> =
+        FORMATS.iter().flat_map(|format| format.endings).map(|ending| format!(".{ending}")).collect();
+    let (last, others) = all.split_last().map_or(("", &[][..]), |(last, others)| (last.as_str(), others));
+    format!("{} or {last}", others.join(", "))
+}
+
+/// Reads the surface in `file`; merged nodes are reported in `warnings`, and a scale that seems to be forgotten.
+pub(crate) fn read(file: &Path, placement: &Placement, warnings: &mut Vec<String>) -> Result<Surface, Error> {
+    let Body { mut nodes, surface_nodes, triangles, .. } = read_body(file, placement, &[], warnings)?;
+    nodes.truncate(surface_nodes);
+    warnings.extend(oversize(file, placement, &nodes));
+    Ok((nodes, triangles))
+}
+
+/// Reads the tetrahedra in `file`. `wanted`: the regions that the scene names, in its order.
+pub(super) fn read_tetrahedra(
     file: &Path,
     placement: &Placement,
+    wanted: &[u32],
     warnings: &mut Vec<String>,
-) -> Result<Surface, Error> {
+) -> Result<Body, Error> {
+    let body = read_body(file, placement, wanted, warnings)?;
+    if body.tetrahedra.is_empty() {
+        let reason = format!(
+            "it has no tetrahedra, hexahedra, prisms or pyramids, but {}: mesh the volume (in Gmsh: -3 -order 2), or \
+             give the surface as [object.mesh]",
+            counted(body.triangles.len(), ["triangle", "triangles"])
+        );
+        return Err(unreadable(file, &reason));
+    }
+    warnings.extend(oversize(file, placement, &body.nodes));
+    Ok(body)
+}
+
+/// Reads what `file` holds, of any size: a solid, or else a surface.
+pub(super) fn read_body(
+    file: &Path,
+    placement: &Placement,
+    wanted: &[u32],
+    warnings: &mut Vec<String>,
+) -> Result<Body, Error> {
     check_scale(placement)?;
-    let unreadable = |reason: String| unreadable(file, &reason);
-    let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let reader = match extension.as_str() {
-        "obj" => obj::read,
-        "stl" => stl::read,
-        "ply" => ply::read,
-        _ => {
-            return Err(Error::at(file, "not a known mesh format: give a file that ends in .obj, .stl or .ply"));
-        }
+    let Some(format) = format(file) else {
+        let message = format!("not a known mesh format: give a file that ends in {}", endings());
+        return Err(Error::at(file, message));
     };
-    let (nodes, mut triangles) = reader(&mut BufReader::new(open(file)?)).map_err(unreadable)?;
+    let mut input = Input { path: file, stream: BufReader::new(open(file)?), wanted };
+    let mesh = (format.read)(&mut input).map_err(|reason| unreadable(file, &reason))?;
+    Ok(if mesh.tetrahedra.is_empty() {
+        Body::shell(surface(file, placement, mesh, format.is_soup, warnings))
+    } else {
+        solid(file, placement, mesh, warnings)
+    })
+}
+
+/// Merges nodes that lie on one another, and drops faces that are left without area.
+fn surface(file: &Path, placement: &Placement, mesh: Mesh, is_soup: bool, warnings: &mut Vec<String>) -> Surface {
+    let Mesh { nodes, mut triangles, .. } = mesh;
     let count = nodes.len();
     let nodes = weld(nodes, &mut triangles);
-    if nodes.len() < count && extension != "stl" {
+    if nodes.len() < count && !is_soup {
         let (file, merged) = (file.display(), count - nodes.len());
         warnings.push(format!("{file}: {merged} of {count} nodes lay exactly on another and were merged with it"));
     }
@@ -72,28 +205,18 @@ pub(super) fn read_of_any_size(
         let (file, dropped) = (file.display(), faces - triangles.len());
         warnings.push(format!("{file}: {dropped} of {faces} faces had two corners in one place and were left out"));
     }
-    Ok((placement.place(nodes), triangles))
+    (placement.place(nodes), triangles)
 }
 
-/// Reads the tetrahedra in a Gmsh file. `wanted`: the physical volumes that the scene names, in its order.
-pub(super) fn read_tetrahedra(
-    file: &Path,
-    placement: &Placement,
-    wanted: &[u32],
-    warnings: &mut Vec<String>,
-) -> Result<Body, Error> {
-    check_scale(placement)?;
-    let unreadable = |reason: String| unreadable(file, &reason);
-    let mesh = msh::read(&mut BufReader::new(open(file)?), wanted).map_err(unreadable)?;
-    check_coordinates(&mesh.nodes).map_err(unreadable)?;
+/// Orders the nodes of tetrahedra, and finds their surface.
+fn solid(file: &Path, placement: &Placement, mesh: Mesh, warnings: &mut Vec<String>) -> Body {
     let nodes = placement.place(mesh.nodes);
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra, mesh.mid_nodes);
-    let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
         let (file, all) = (file.display(), ordered.tetrahedra.len());
         warnings.push(format!("{file}: {turned} of {all} tetrahedra were numbered inside out and were turned"));
     }
-    Ok(ordered)
+    Body { regions: mesh.regions, ..ordered }
 }
 
 /// Least and greatest coordinates of `nodes` (m).
@@ -126,7 +249,7 @@ fn check_coordinates(nodes: &[DVec3]) -> Result<(), String> {
 }
 
 /// A warning where the scale was forgotten.
-pub(super) fn oversize(file: &Path, Placement { scale, .. }: &Placement, nodes: &[DVec3]) -> Option<String> {
+fn oversize(file: &Path, Placement { scale, .. }: &Placement, nodes: &[DVec3]) -> Option<String> {
     let length = length(nodes);
     (length > MOST_METRES).then(|| {
         format!(

@@ -8,8 +8,10 @@ use haptize::{
 
 #[test]
 fn the_same_cube_comes_out_of_all_formats() {
-    for name in ["cube.obj", "cube.ply", "cube.stl"] {
-        let object = Object::build(&mesh_spec(dataset(name))).unwrap();
+    let written_by_others = ["cube.dae", "cube.glb", "cube.vtk", "cube.vtp"].map(|name| (name, sample(name)));
+    let shipped = ["cube.obj", "cube.ply", "cube.stl"].map(|name| (name, dataset(name)));
+    for (name, file) in shipped.into_iter().chain(written_by_others) {
+        let object = Object::build(&mesh_spec(file)).unwrap();
         assert_eq!((object.rest.len(), object.triangles.len()), (8, 12), "{name}");
         assert!(object.warnings.is_empty(), "{name}: {:?}", object.warnings);
         assert!((six_volumes(&object) - 6.0).abs() < 1e-12, "{name}: a cube of side 2, scaled by 0.5");
@@ -130,7 +132,7 @@ fn missing_and_unknown_files_are_refused_by_name() {
     assert_eq!(missing.kind(), ErrorKind::File);
     assert!(missing.to_string().contains("/nowhere/lost.obj"), "{missing}");
     let unknown = build_from("xyz", b"0 0 0").unwrap_err();
-    assert!(unknown.to_string().contains(".obj, .stl or .ply"), "{unknown}");
+    assert!(unknown.to_string().contains(".obj, .stl, .ply"), "{unknown}");
     assert_eq!(Object::build(&mesh_spec("/dev/null.obj")).unwrap_err().kind(), ErrorKind::File);
 }
 

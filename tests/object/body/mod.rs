@@ -1,5 +1,7 @@
 //! The deformable object: its surface, its stiffness and its compliance; what is refused, and why.
 
+mod collada;
+mod gltf;
 mod meshes;
 
 use glam::{DMat3, DVec3};
@@ -34,6 +36,11 @@ fn mesh_spec(file: impl Into<PathBuf>) -> ObjectSpec {
 
 fn dataset(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets").join(name)
+}
+
+/// A file of tests/references/mesh_formats.py.
+fn sample(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/object/meshes").join(name)
 }
 
 fn sphere() -> Object {

@@ -8,8 +8,8 @@ use std::fmt::Write;
 /// Gmsh's order of nodes: its types of first order, of second order without and with nodes in faces; the corners' edges,
 /// and its faces of four corners.
 pub struct Cell {
-    kinds: [u64; 3],
-    corners: usize,
+    pub kinds: [u64; 3],
+    pub corners: usize,
     pub edges: &'static [[usize; 2]],
     pub squares: &'static [[usize; 4]],
 }
@@ -21,21 +21,21 @@ pub const HEXAHEDRON: Cell = Cell {
     squares: &[[0, 1, 2, 3], [0, 1, 5, 4], [0, 3, 7, 4], [1, 2, 6, 5], [2, 3, 7, 6], [4, 5, 6, 7]],
 };
 
-const PRISM: Cell = Cell {
+pub const PRISM: Cell = Cell {
     kinds: [6, 18, 13],
     corners: 6,
     edges: &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]],
     squares: &[[0, 1, 4, 3], [0, 2, 5, 3], [1, 2, 5, 4]],
 };
 
-const PYRAMID: Cell = Cell {
+pub const PYRAMID: Cell = Cell {
     kinds: [7, 19, 14],
     corners: 5,
     edges: &[[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]],
     squares: &[[0, 1, 2, 3]],
 };
 
-const TETRAHEDRON: Cell =
+pub const TETRAHEDRON: Cell =
     Cell { kinds: [4, 11, 11], corners: 4, edges: &[[0, 1], [1, 2], [0, 2], [0, 3], [2, 3], [1, 3]], squares: &[] };
 
 /// The cells that fill a cube, as its corners in Gmsh's order; 8 is its middle. Half of the pyramids are inside out.
@@ -48,9 +48,20 @@ fn in_cube(cell: &Cell) -> Vec<Vec<usize>> {
     }
 }
 
-/// A file of cells of type `kinds[order]` in `counts` cubes, whose nodes `place` puts from [0, 1]^3 in space (m), their
-/// numbers out of order.
-fn msh(cell: &Cell, order: usize, counts: [i32; 3], place: impl Fn(DVec3) -> DVec3) -> String {
+/// A file of cells of type `kinds[order]`, as [`mesh`] makes them, their numbers out of order.
+pub fn msh(cell: &Cell, order: usize, counts: [i32; 3], place: impl Fn(DVec3) -> DVec3) -> String {
+    let (places, elements) = mesh(cell, order, counts, place);
+    let elements: Vec<(u32, Vec<usize>)> = elements.into_iter().map(|nodes| (1, nodes)).collect();
+    written(cell.kinds[order], &places, &elements)
+}
+
+/// Nodes (m) and cells of an `order` in `counts` cubes; `place` puts the nodes from [0, 1]^3 in space.
+pub fn mesh(
+    cell: &Cell,
+    order: usize,
+    counts: [i32; 3],
+    place: impl Fn(DVec3) -> DVec3,
+) -> (Vec<DVec3>, Vec<Vec<usize>>) {
     let corner = |k: usize| match k {
         8 => [2, 2, 2],
         k => [[0, 1, 1, 0][k % 4], [0, 0, 1, 1][k % 4], k as i32 / 4].map(|i| 4 * i),
@@ -85,8 +96,7 @@ fn msh(cell: &Cell, order: usize, counts: [i32; 3], place: impl Fn(DVec3) -> DVe
         let at = DVec3::from_array([0, 1, 2].map(|axis| f64::from(at[axis]) / f64::from(4 * counts[axis])));
         places[number] = place(at);
     }
-    let elements: Vec<(u32, Vec<usize>)> = elements.into_iter().map(|nodes| (1, nodes)).collect();
-    written(cell.kinds[order], &places, &elements)
+    (places, elements)
 }
 
 /// A file of elements of type `kind`, each with its physical volume, between nodes at `places` (m), whose numbers are
@@ -116,7 +126,7 @@ pub fn build(content: &str, material: Material, ground: GroundSpec) -> Object {
 }
 
 /// A box of 0.2 m whose middle is drawn aside: its sides stay flat, or are bent.
-fn skewed(at: DVec3, is_bent: bool) -> DVec3 {
+pub fn skewed(at: DVec3, is_bent: bool) -> DVec3 {
     let bubble: f64 = at.to_array().iter().map(|x| 4.0 * x * (1.0 - x)).product();
     let bend =
         if is_bent { DVec3::new(0.05 * at.z * at.z, 0.03 * at.x * at.z, -0.04 * at.x * at.x) } else { DVec3::ZERO };

@@ -6,6 +6,7 @@ mod bodies;
 mod cells;
 mod convergence;
 mod fitted;
+mod formats;
 mod gmsh;
 mod indentation;
 mod lattice;

@@ -245,6 +245,12 @@ targets! {
     ply_meshes: targets::PLY;
     stl_meshes: targets::STL;
     gmsh_meshes: targets::MSH;
+    gltf_meshes: targets::GLTF;
+    collada_meshes: targets::COLLADA;
+    vtk_meshes: targets::VTK;
+    vtk_meshes_in_xml: targets::VTU;
+    tetgen_meshes: targets::TETGEN;
+    medit_meshes: targets::MEDIT;
     robots: targets::ROBOTS;
     joint_states_in_mcap: targets::MCAP;
     device_mappings: targets::DEVICES;

@@ -5,11 +5,11 @@ use crate::objects;
 use haptize::{
     Error,
     object::Object,
+    robot::{self, Arm, Robot},
     scene::{
         ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Placement, Shape, SpringKind,
         SpringSpec,
     },
-    urdf::{self, Arm, Robot},
 };
 use std::path::Path;
 
@@ -17,7 +17,8 @@ use std::path::Path;
 fn mesh(file: &Path, input: &[u8], refine: Option<f64>, material: Material) -> String {
     write(file, input);
     let file = file.to_path_buf();
-    let tetrahedra = file.extension().is_some_and(|extension| extension == "msh");
+    let solids = ["msh", "ele", "mesh", "vtk", "vtu"];
+    let tetrahedra = file.extension().is_some_and(|extension| solids.iter().any(|solid| extension == *solid));
     let placement = Placement { scale: 0.1, ..Placement::METRES };
     let shape =
         if tetrahedra { Shape::Tetrahedra { file, placement } } else { Shape::Mesh { file, placement, refine } };
@@ -110,17 +111,77 @@ fn binary_stl() -> Vec<u8> {
 pub const MSH: Target = Target {
     name: "msh",
     extension: "msh",
-    seeds: || vec![objects::BLOCK.into(), objects::BLOCK_4.into()],
+    seeds: || vec![objects::BLOCK.into(), objects::BLOCK_4.into(), sample("binary_2.msh"), sample("binary_4.msh")],
+    mutate: PLY.mutate,
+    run: |file, input| mesh(file, input, None, SOLID),
+    kinds: 30,
+};
+
+const SOLID: Material = Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: None, inclusions: Vec::new() });
+
+/// A file of tests/references/mesh_formats.py.
+fn sample(name: &str) -> Vec<u8> {
+    shipped(&format!("tests/object/meshes/{name}"))
+}
+
+pub const GLTF: Target = Target {
+    name: "gltf",
+    extension: "glb",
+    // The text of a part alone is a file of its own, whose bytes are missing.
+    seeds: || vec![sample("cube.glb"), sample("cube.glb")[20..].to_vec()],
+    run: |file, input| mesh(file, input, None, SPRINGS),
+    kinds: 12,
+    ..MSH
+};
+
+pub const COLLADA: Target = Target {
+    name: "collada",
+    extension: "dae",
+    seeds: || vec![sample("cube.dae")],
+    mutate: mutate::text,
+    run: GLTF.run,
+    kinds: 12,
+};
+
+pub const VTK: Target = Target {
+    name: "vtk",
+    extension: "vtk",
+    seeds: || vec![sample("binary_5.vtk"), sample("text_4.vtk"), sample("cube.vtk")],
+    kinds: 12,
+    ..MSH
+};
+
+pub const VTU: Target = Target {
+    name: "vtu",
+    extension: "vtu",
+    seeds: || ["text.vtu", "base64_zlib.vtu", "raw_lz4.vtu", "appended.vtu", "cube.vtp"].map(sample).to_vec(),
+    kinds: 12,
+    ..MSH
+};
+
+pub const MEDIT: Target = Target {
+    name: "medit",
+    extension: "mesh",
+    seeds: || vec![sample("block.mesh")],
+    mutate: mutate::text,
+    kinds: 12,
+    ..MSH
+};
+
+/// Between the nodes and the tetrahedra of one input.
+const NEXT: &[u8] = b"\n%%\n";
+
+pub const TETGEN: Target = Target {
+    name: "tetgen",
+    extension: "ele",
+    seeds: || vec![[&sample("block.node"), NEXT, &sample("block.ele")].concat()],
     mutate: mutate::text,
     run: |file, input| {
-        mesh(
-            file,
-            input,
-            None,
-            Material::Elastic(ElasticSpec { young: 1e4, poisson: 0.3, cell: None, inclusions: Vec::new() }),
-        )
+        let place = input.windows(NEXT.len()).position(|window| window == NEXT).unwrap_or(0);
+        write(&file.with_extension("node"), &input[..place]);
+        mesh(file, input.get(place + NEXT.len()..).unwrap_or_default(), None, SOLID)
     },
-    kinds: 30,
+    kinds: 12,
 };
 
 pub const ROBOTS: Target = Target {
@@ -129,7 +190,11 @@ pub const ROBOTS: Target = Target {
     seeds: || {
         let file = |name: &str| shipped(&format!("tests/robots/{name}"));
         let arm = String::from_utf8(file("arm.urdf")).unwrap();
-        vec![arm.replace("package://robots/meshes/tip.obj", "tip.obj").into_bytes(), file("finger.urdf")]
+        vec![
+            arm.replace("package://robots/meshes/tip.obj", "tip.obj").into_bytes(),
+            file("finger.urdf"),
+            file("crane.xml"),
+        ]
     },
     mutate: mutate::text,
     run: |file, input| {
@@ -150,7 +215,7 @@ fn imported(file: &Path) -> Result<String, Error> {
     let robot = Robot::load(file)?;
     let tip = robot.links.iter().rev().find(|link| link.name != "camera").map_or("none", |link| &link.name);
     let arm = Arm::new(&robot, tip, &[])?;
-    let nodes = urdf::sample(&robot, &arm, Some(0.02), None)?;
-    let (shapes, _) = urdf::drawn_shapes(&robot, &arm, None);
-    urdf::write_scene(&robot, &arm, &nodes, &shapes, "haptize import")
+    let nodes = robot::sample(&robot, &arm, Some(0.02), None)?;
+    let (shapes, _) = robot::drawn_shapes(&robot, &arm, None);
+    robot::write_scene(&robot, &arm, &nodes, &shapes, "haptize import")
 }

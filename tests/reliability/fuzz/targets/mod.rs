@@ -7,7 +7,7 @@ mod stores;
 
 pub use devices::{DEVICES, FRAMES, REPLIES};
 pub use measured::{LOGS, MAPPINGS, MCAP};
-pub use meshes::{MSH, OBJ, PLY, ROBOTS, STL};
+pub use meshes::{COLLADA, GLTF, MEDIT, MSH, OBJ, PLY, ROBOTS, STL, TETGEN, VTK, VTU};
 pub use stores::STORES;
 
 use super::mutate::{self, Random};

@@ -54,13 +54,13 @@ pub fn drawn_shapes(robot: &Robot, arm: &Arm, packages: Option<&Path>) -> (Vec<L
     (shapes, notes)
 }
 
-/// The form of a shape that is no mesh.
+/// The form of a shape that is neither capsule nor mesh.
 fn form(geometry: &Geometry) -> Option<LinkForm> {
     match geometry {
         Geometry::Box(size) => Some(LinkForm::Box(*size)),
         Geometry::Cylinder { radius, length } => Some(LinkForm::Cylinder { radius: *radius, length: *length }),
         Geometry::Sphere(radius) => Some(LinkForm::Sphere(*radius)),
-        Geometry::Mesh { .. } => None,
+        Geometry::Capsule { .. } | Geometry::Mesh { .. } => None,
     }
 }
 

@@ -6,12 +6,11 @@
 //! last moving joint before them, branches beside the chain included.
 
 use super::group::Group;
-use super::robot::{Joint, JointType, Robot};
-use super::{Inertial, Placed};
+use super::{Inertial, Joint, JointType, Mimic, Placed, Robot};
 use crate::Error;
 use crate::MAX_JOINTS;
 use crate::scene::JointKind;
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
@@ -63,6 +62,8 @@ pub struct ArmJoint {
     pub effort: Option<f64>,
     /// Greatest speed, where the file gives it (rad/s or m/s).
     pub velocity: Option<f64>,
+    /// Inertia of its actuator as the joint feels it, where the file gives it (kg m^2 or kg).
+    pub rotor_inertia: Option<f64>,
     /// Links that move with it.
     pub links: Vec<String>,
     /// Inertia of all of these together, in the joint's frame.
@@ -119,6 +120,7 @@ impl Arm {
                 limits,
                 effort: joint.effort.filter(|effort| *effort > 0.0),
                 velocity: joint.velocity.filter(|velocity| *velocity > 0.0),
+                rotor_inertia: joint.rotor_inertia,
                 links: group.names(robot),
                 inertial: group.inertial(),
                 shapes: group.shapes,
@@ -129,10 +131,11 @@ impl Arm {
     }
 }
 
-/// Motions of the joints that do not move: identity if fixed, that of its value if locked.
+/// Motions of the joints that do not move: identity if fixed, that of its value if locked or if it follows a locked one.
 fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error> {
     let fixed = robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointType::Fixed);
     let mut held: HashMap<usize, DAffine3> = fixed.map(|(number, _)| (number, DAffine3::IDENTITY)).collect();
+    let mut values: HashMap<&str, f64> = HashMap::new();
     for Lock { joint: name, value } in locks {
         let refuse = |message: String| Err(Error::at(&robot.path, message));
         let Some(number) = robot.joints.iter().position(|joint| joint.name == *name) else {
@@ -146,21 +149,34 @@ fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error
         {
             return refuse(format!("joint {name:?} cannot be locked at {value}: its limits are {lower} and {upper}"));
         }
-        let motion = match joint.kind {
-            JointType::Revolute | JointType::Continuous => {
-                DAffine3::from_quat(DQuat::from_axis_angle(joint.axis, *value))
-            }
-            JointType::Prismatic => DAffine3::from_translation(*value * joint.axis),
-            JointType::Fixed => return refuse(format!("joint {name:?} is fixed already: leave out its --lock")),
-            JointType::Floating | JointType::Planar => {
-                return refuse(format!("joint {name:?} has more than one coordinate: make it fixed in the file"));
-            }
+        let Some(motion) = joint.motion(*value) else {
+            return refuse(match joint.kind {
+                JointType::Fixed => format!("joint {name:?} is fixed already: leave out its --lock"),
+                _ => format!("joint {name:?} has more than one coordinate: make it fixed in the file"),
+            });
         };
         if held.insert(number, motion).is_some() {
             return refuse(format!("joint {name:?} is locked twice: keep one --lock"));
         }
+        values.insert(name, *value);
     }
-    Ok(held)
+    // A joint may follow one that follows another: each round goes one farther.
+    loop {
+        let before = held.len();
+        for (number, joint) in robot.joints.iter().enumerate().filter(|(_, joint)| joint.mimic.is_some()) {
+            let value = joint.mimic.as_ref().and_then(|Mimic { joint, multiplier, offset }| {
+                values.get(joint.as_str()).map(|value| multiplier * value + offset)
+            });
+            let motion = value.and_then(|value| Some((value, joint.motion(value)?)));
+            if let (Some((value, motion)), false) = (motion, held.contains_key(&number)) {
+                held.insert(number, motion);
+                values.insert(&joint.name, value);
+            }
+        }
+        if held.len() == before {
+            return Ok(held);
+        }
+    }
 }
 
 /// Joints from the root to the link `tip`.
@@ -171,7 +187,7 @@ fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, Error> {
         let known = if robot.links.is_empty() {
             "the robot has no links at all: give a file that describes one".into()
         } else if ends.is_empty() {
-            "no chain ends, for its joints form a circle: a URDF is a tree; remove one of them".into()
+            "no chain ends, for its joints form a circle: a robot is a tree; remove one of them".into()
         } else {
             format!("chains end at {}", listed(ends.iter().map(|(_, link)| &link.name)))
         };
@@ -185,7 +201,7 @@ fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, Error> {
         let joint = &robot.joints[number];
         if way.len() == robot.joints.len() {
             let message =
-                format!("joint {:?} belongs to a circle of joints: a URDF is a tree; remove one of them", joint.name);
+                format!("joint {:?} belongs to a circle of joints: a robot is a tree; remove one of them", joint.name);
             return Err(robot.source().error(joint.span.clone(), message));
         }
         way.push(number);
@@ -265,12 +281,15 @@ impl Builder<'_> {
     fn movement(&mut self, joint: &Joint) -> Result<(JointKind, [f64; 2]), Error> {
         let name = &joint.name;
         let refuse = |message: String| Err(self.robot.source().error(joint.span.clone(), message));
-        if let Some(leader) = &joint.mimic {
+        if let Some(Mimic { joint: leader, .. }) = &joint.mimic {
             let chain = self.way.iter().map(|&number| &self.robot.joints[number]).filter(|other| other.name != *name);
-            if chain.into_iter().any(|other| other.name == *leader || other.mimic.as_ref() == Some(leader)) {
+            if chain
+                .into_iter()
+                .any(|other| other.name == *leader || other.mimic.as_ref().is_some_and(|mimic| mimic.joint == *leader))
+            {
                 return refuse(format!(
                     "joint {name:?} follows {leader:?} (mimic), as another joint of the chain does or is, and the \
-                     joints of a scene move independently: hold it with --lock {name}=VALUE, or remove <mimic>"
+                     joints of a scene move independently: hold both with --lock {leader}=VALUE, or remove <mimic>"
                 ));
             }
             let message = format!(
@@ -298,7 +317,11 @@ impl Builder<'_> {
                      {LEAST_RANGE} or more"
                 ));
             }
-            None => return refuse(format!("joint {name:?} has no limits: add <limit lower=\"..\" upper=\"..\"/>")),
+            None => {
+                return refuse(format!(
+                    "joint {name:?} has no limits: add <limit lower=\"..\" upper=\"..\"/>, in MJCF range=\"..\""
+                ));
+            }
         };
         if joint.kind == JointType::Continuous {
             self.note(&joint.span, format!("joint {name:?} turns without end: its limits in the scene are -pi and pi"));
@@ -332,8 +355,8 @@ impl Builder<'_> {
             if link.is_visual && !link.shapes.is_empty() {
                 self.note(&link.span, format!("link {:?} has no <collision>: its <visual> shapes are used", link.name));
             }
-            for span in &link.empty {
-                self.note(span, format!("link {:?} has a shape of no size: it is left out", link.name));
+            for (span, reason) in &link.left_out {
+                self.note(span, format!("link {:?}: {reason}", link.name));
             }
             if link.inertial.is_none() && !link.shapes.is_empty() && group.inertial().mass > 0.0 {
                 self.note(&link.span, format!("link {:?} has no <inertial>: it counts as massless", link.name));

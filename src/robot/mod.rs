@@ -1,4 +1,4 @@
-//! Arms from URDF, the robot description of ROS (<http://wiki.ros.org/urdf/XML>): a robot's file becomes a scene.
+//! Arms from the descriptions of robots, URDF and MJCF: a robot's file becomes a scene.
 //!
 //! [`Robot::load`] reads links and joints, [`Arm::new`] takes the chain from the root to a tip link, [`sample`] puts
 //! contact nodes on the links' shapes, and [`write_scene`] writes the scene file that a person would have written.
@@ -7,8 +7,8 @@
 //! | file | subject |
 //! |---|---|
 //! | `document.rs` | XML: elements, numbers, errors at their place |
-//! | `robot.rs` | links and joints as the file has them |
-//! | `link.rs` | inertia and shapes of one link |
+//! | `description.rs` | links and joints of a robot, whatever its format |
+//! | `urdf.rs`, `mjcf.rs` | these from the formats |
 //! | `group.rs` | links that do not move against each other, as one body |
 //! | `arm.rs` | the chain in world-parallel frames, fixed joints folded in |
 //! | `package.rs` | files that `package://` names |
@@ -20,21 +20,21 @@
 //! | `shape.rs` | its end: what is drawn of the links |
 
 mod arm;
+mod description;
 mod document;
 mod drawn;
 mod group;
-mod link;
+mod mjcf;
 mod nodes;
 mod package;
 mod practice;
-mod robot;
 mod shape;
 mod surface;
 mod text;
+mod urdf;
 
 pub use arm::{Arm, ArmJoint, Lock, Note};
+pub use description::{Geometry, Inertial, Joint, JointType, Link, Mimic, Placed, Robot};
 pub use drawn::drawn_shapes;
-pub use link::{Geometry, Inertial, Link, Placed};
 pub use nodes::{ContactNodes, sample};
-pub use robot::{Joint, JointType, Robot};
 pub use text::write_scene;

@@ -1,13 +1,14 @@
-//! Arms from URDF: kinematics and inertia against the file's own links, nodes on the links' shapes, scenes that bake,
+//! Arms from URDF and MJCF: kinematics and inertia against the file's own links, nodes on the links' shapes, scenes that bake,
 //! and bad files refused at their line.
 
+mod mjcf;
 mod motion;
 mod refusals;
 mod scenes;
 
 use haptize::{
     Error,
-    urdf::{Arm, Lock, Robot},
+    robot::{Arm, Lock, Robot},
 };
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! Files and requests that are refused, with the place and the remedy.
 
 use super::{arm, file};
-use haptize::urdf::{Robot, sample};
+use haptize::robot::{Robot, sample};
 
 /// The robot that the cases below alter.
 const PLAIN: &str = r#"<robot name="plain">
@@ -36,14 +36,14 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
         "<limit lower=\"-1\" upper=\"1\"/>",
         "<limit lower=\"-1\" upper=\"1\"/><mimic joint=\"grip\"/>",
         5,
-        &["mimic", "--lock turn"],
+        &["mimic", "--lock grip"],
     ),
     ("revolute", "floating", 5, &["floating", "fixed"]),
     ("revolute", "planar", 5, &["planar", "fixed"]),
     ("revolute", "ball", 5, &["\"ball\"", "revolute"]),
     ("xyz=\"0 1 0\"", "xyz=\"0 0 0\"", 5, &["axis zero"]),
     ("xyz=\"0 1 0\"", "xyz=\"0 1\"", 6, &["3 numbers"]),
-    ("xyz=\"0 1 0\"", "xyz=\"0 1 0 0\"", 6, &["there are more"]),
+    ("xyz=\"0 1 0\"", "xyz=\"0 1 0 0\"", 6, &["there are 4"]),
     ("<child link=\"arm\"/>", "<child link=\"leg\"/>", 6, &["no link \"leg\""]),
     ("<parent link=\"base\"/>", "", 5, &["<parent"]),
     ("<parent link=\"base\"/>", "<parent link=\"hand\"/>", 8, &["circle"]),
@@ -64,7 +64,7 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
         &["\"nowhere\"", "--package-path"],
     ),
     ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"https://a.org/a.stl\"/>", 3, &["https", "copy"]),
-    ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"arm.urdf\"/>", 3, &[".obj, .stl or .ply"]),
+    ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"arm.urdf\"/>", 3, &[".obj, .stl, .ply"]),
     ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"meshes/tip.obj\" scale=\"1 0 1\"/>", 3, &["scale"]),
     (
         "<link name=\"hand\"/>",
@@ -98,7 +98,8 @@ fn what_no_scene_can_hold_is_refused_at_its_line() {
 #[test]
 fn other_files_are_told_apart() {
     let error = |text: &str| Robot::parse(text.into(), "model.xml").unwrap_err().to_string();
-    assert!(error("<mujoco model=\"x\"/>").contains("<mujoco>"));
+    assert!(error("<sdf version=\"1.9\"/>").contains("<sdf>"));
+    assert!(error("<mujoco model=\"x\"/>").contains("no <worldbody>"));
     assert!(error("").contains("not well-formed"));
     let xacro = Robot::parse(PLAIN.into(), "plain.urdf.xacro").unwrap_err().to_string();
     assert!(xacro.contains("pip install xacro"), "{xacro}");
@@ -186,8 +187,8 @@ fn a_mesh_in_millimetres_is_told_with_its_length_and_scale() {
     let text = PLAIN.replace("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"plate.obj\"/>");
     let told = |text: &str, spacing: f64| {
         let robot = Robot::parse(text.to_owned(), folder.path().join("robot.urdf")).unwrap();
-        let arm = haptize::urdf::Arm::new(&robot, "hand", &[]).unwrap();
-        let notes = haptize::urdf::drawn_shapes(&robot, &arm, None).1;
+        let arm = haptize::robot::Arm::new(&robot, "hand", &[]).unwrap();
+        let notes = haptize::robot::drawn_shapes(&robot, &arm, None).1;
         (sample(&robot, &arm, Some(spacing), None).map(|nodes| nodes.spacing).map_err(|error| error.to_string()), notes)
     };
     let (refused, notes) = told(&text, 0.005);

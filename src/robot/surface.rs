@@ -23,13 +23,9 @@ impl Surface {
             Geometry::Box(size) => Self::from(proxy::block(*size)),
             Geometry::Cylinder { radius, length } => Self::from(proxy::cylinder(*radius, *length)),
             Geometry::Sphere(radius) => Self::from(proxy::sphere(*radius)),
+            Geometry::Capsule { radius, length } => Self::from(proxy::capsule(*radius, *length)),
             Geometry::Mesh { file, scale } => {
                 let file = package::resolve(file, source.path, packages).map_err(refuse)?;
-                if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dae")) {
-                    let message = "COLLADA (.dae) is not read: convert the mesh to STL or OBJ (Blender, or `trimesh` \
-                                   from pip), or give the link a <collision> with a box, a cylinder or a sphere";
-                    return Err(refuse(message.into()));
-                }
                 // Merged nodes and dropped faces change no surface.
                 let read = object::read_surface(&file, &Placement::METRES, &mut Vec::new());
                 let (mut nodes, triangles) = read.map_err(|error| refuse(error.to_string()))?;

@@ -60,7 +60,7 @@ fn proxy(arm: &Arm, nodes: &ContactNodes) -> ProxySpec {
             mass: joint.inertial.mass,
             centre_of_mass: joint.inertial.centre,
             inertia: joint.inertial.inertia,
-            rotor_inertia: ROTOR[usize::from(joint.kind == JointKind::Prismatic)],
+            rotor_inertia: joint.rotor_inertia.unwrap_or(ROTOR[usize::from(joint.kind == JointKind::Prismatic)]),
             nodes: nodes.iter().map(node).collect(),
         });
     }
@@ -187,12 +187,9 @@ fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fm
         let meaning = if is_aligned { "kg m^2" } else { "kg m^2: xx, yy, zz, xy, xz, yz" };
         entry(text, "inertia", &list(&numbers, |x| significant(*x)), meaning)?;
     }
-    let rotor = if turns {
-        "kg m^2, of the actuator, not in the robot's file"
-    } else {
-        "kg, of the actuator, not in the robot's file"
-    };
-    entry(text, "rotor_inertia", &significant(spec.rotor_inertia), rotor)?;
+    let unit = if turns { "kg m^2" } else { "kg" };
+    let source = if joint.rotor_inertia.is_some() { "" } else { ", not in the robot's file" };
+    entry(text, "rotor_inertia", &significant(spec.rotor_inertia), &format!("{unit}, of the actuator{source}"))?;
     if spec.nodes.is_empty() {
         return Ok(());
     }

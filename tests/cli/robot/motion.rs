@@ -5,8 +5,8 @@ use glam::{DMat3, DVec3};
 use haptize::{
     JointVector,
     proxy::{Chain, Pose},
+    robot::{Arm, Geometry, Note, sample, write_scene},
     scene::{JointKind, Scene},
-    urdf::{Arm, Geometry, Note, sample, write_scene},
 };
 use std::f64::consts::FRAC_PI_2;
 
@@ -125,16 +125,23 @@ fn kinetic_energy_is_that_of_the_files_links() {
 
 #[test]
 fn contact_nodes_lie_on_the_shapes() {
-    let (robot, arm) = arm(&std::fs::read_to_string(file("arm.urdf")).unwrap(), "probe", &[]).unwrap();
-    let nodes = sample(&robot, &arm, Some(0.006), None).unwrap();
-    assert!(
-        nodes.of_joints.iter().all(|nodes| nodes.len() > 10),
-        "{:?}",
-        nodes.of_joints.iter().map(Vec::len).collect::<Vec<_>>()
-    );
-    for (joint, nodes) in arm.joints.iter().zip(&nodes.of_joints) {
+    let read = |name: &str| std::fs::read_to_string(file(name)).unwrap();
+    let arms = [
+        arm(&read("arm.urdf"), "probe", &[]).unwrap(),
+        arm(&read("crane.xml"), "hand", &[("yaw", 0.0), ("finger", 0.01)]).unwrap(),
+    ];
+    for (robot, arm) in arms {
+        let nodes = sample(&robot, &arm, Some(0.006), None).unwrap();
+        let counts: Vec<usize> = nodes.of_joints.iter().map(Vec::len).collect();
+        assert!(counts.iter().all(|count| *count > 10), "{counts:?}");
+        lie_on_the_shapes(&arm, &nodes.of_joints);
+    }
+}
+
+fn lie_on_the_shapes(arm: &Arm, of_joints: &[Vec<DVec3>]) {
+    for (joint, nodes) in arm.joints.iter().zip(of_joints) {
         for node in nodes {
-            let off = |shape: &haptize::urdf::Placed| {
+            let off = |shape: &haptize::robot::Placed| {
                 let x = shape.place.inverse().transform_point3(*node);
                 match &shape.geometry {
                     Geometry::Box(size) => {
@@ -142,6 +149,10 @@ fn contact_nodes_lie_on_the_shapes() {
                         d.max(DVec3::ZERO).length() + d.max_element().min(0.0)
                     }
                     Geometry::Sphere(radius) => x.length() - radius,
+                    Geometry::Capsule { radius, length } => {
+                        let half = 0.5 * length;
+                        (x - x.z.clamp(-half, half) * DVec3::Z).length() - radius
+                    }
                     Geometry::Cylinder { radius, length } => {
                         let d = glam::DVec2::new(x.truncate().length() - radius, x.z.abs() - 0.5 * length);
                         d.max(glam::DVec2::ZERO).length() + d.max_element().min(0.0)
@@ -216,4 +227,26 @@ fn a_joint_that_follows_one_beside_the_chain_moves_by_itself() {
     assert_eq!(followed.joints.len(), 4);
     assert!(followed.notes.iter().any(|note| note.message.contains("follows \"camera_tilt\"")), "{:?}", followed.notes);
     assert!(arm(&follows("yaw"), "probe", &[]).is_err());
+}
+
+/// A joint that follows a locked one, and one that follows that in turn, are where the file's affine functions put them.
+#[test]
+fn joints_that_follow_a_locked_one_are_held_with_it() {
+    let text = std::fs::read_to_string(file("arm.urdf")).unwrap();
+    let bend = "<limit lower=\"-1.2\" upper=\"1.5\" effort=\"5\" velocity=\"3\"/>";
+    let roll = "<limit lower=\"-1\" upper=\"1\"/>";
+    let chained = text
+        .replace(bend, &format!("{bend}<mimic joint=\"lift\" multiplier=\"-4\" offset=\"0.3\"/>"))
+        .replace(roll, &format!("{roll}<mimic joint=\"bend\"/>"));
+    let bodies = |arm: &Arm| arm.joints.iter().map(|joint| (joint.name.clone(), joint.inertial)).collect::<Vec<_>>();
+    let held = arm(&chained, "probe", &[("lift", 0.05)]).unwrap().1;
+    let (bend, roll) = (-4.0 * 0.05 + 0.3, -4.0 * 0.05 + 0.3);
+    let one_by_one = arm(&text, "probe", &[("lift", 0.05), ("bend", bend), ("roll", roll)]).unwrap().1;
+    assert_eq!(held.joints.len(), 1);
+    assert_eq!(format!("{:?}", bodies(&held)), format!("{:?}", bodies(&one_by_one)));
+    // A lock of its own goes before.
+    let own = arm(&chained, "probe", &[("lift", 0.05), ("roll", -0.4)]).unwrap().1;
+    let other = arm(&text, "probe", &[("lift", 0.05), ("bend", bend), ("roll", -0.4)]).unwrap().1;
+    assert_eq!(format!("{:?}", bodies(&own)), format!("{:?}", bodies(&other)));
+    assert_ne!(format!("{:?}", bodies(&own)), format!("{:?}", bodies(&held)));
 }
