@@ -7,6 +7,7 @@ pub mod gridized;
 pub mod hysteresis;
 pub mod jitter;
 pub mod object;
+pub mod page;
 pub mod press;
 pub mod scanned;
 pub mod slices;

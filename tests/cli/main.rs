@@ -9,6 +9,7 @@ mod common;
 mod demo;
 mod device_scenes;
 mod docs;
+mod page;
 mod printed;
 mod report;
 mod scene;
