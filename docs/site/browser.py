@@ -82,15 +82,16 @@ def visit(browser: Browser, page: pathlib.Path, look: str, picture: pathlib.Path
     browser.call("Page.reload")
     browser.call("Runtime.evaluate", expression="new Promise((done) => setTimeout(done, 700))", awaitPromise=True)
     picture.write_bytes(base64.b64decode(browser.call("Page.captureScreenshot")["data"]))
+    wrong = []
     for event in browser.events:
         parameters = event.get("params", {})
         if event["method"] == "Runtime.exceptionThrown":
-            found.append(f"FAILED: {parameters['exceptionDetails']}")
+            wrong.append(parameters["exceptionDetails"].get("exception", {}).get("description"))
         if event["method"] == "Log.entryAdded" and parameters["entry"]["level"] == "error":
-            found.append(f"FAILED: {parameters['entry']['text']}")
+            wrong.append(parameters["entry"]["text"])
         if event["method"] == "Network.requestWillBeSent" and not parameters["request"]["url"].startswith("file:"):
-            found.append(f"FAILED: the page asks for {parameters['request']['url']}")
-    return found
+            wrong.append(f"the page asks for {parameters['request']['url']}")
+    return found + [f"FAILED: {what}" for what in dict.fromkeys(wrong)]
 
 
 def main(folder: str, *pages: str) -> int:

@@ -75,6 +75,11 @@ pub fn instants(
     instants_at(dataset, chain, trace, chosen, live)
 }
 
+/// The error of a frame that shows only a part of the surface.
+fn too_few_nodes(time: f64, nodes: usize, surface: usize) -> Error {
+    error!("cannot draw the deformed object: the frame at {time} s has {nodes} nodes, the dataset's surface {surface}")
+}
+
 /// The tick of a frame.
 fn tick<'a>(trace: &'a Trace, frame: &Frame) -> Option<&'a Tick> {
     let number = trace.ticks.partition_point(|tick| tick.time <= frame.time).checked_sub(1)?;
@@ -97,6 +102,10 @@ pub fn instants_at<'a>(
         let (joints, axes) = (chain.joints.len(), dataset.grid.joints());
         return Err(refused(format!("the chain has {joints} joints, the dataset {axes}; load both from one scene")));
     }
+    if trace.frames.is_empty() {
+        return Ok(Vec::new());
+    }
+    let surface = dataset.surface.as_ref().map_or(0, |surface| surface.nodes.len() / 3);
     let mut pose = chain.new_pose();
     let nodes = trace.frames.iter().map(|frame| frame.nodes.len()).max().unwrap_or(0);
     let all = match live {
@@ -110,6 +119,9 @@ pub fn instants_at<'a>(
             let is_touching = tick.is_some_and(|tick| tick.sample.contact);
             if frame.proxy.len() != chain.joints.len() {
                 return Err(refused(format!("the frame at {} s has {} joints", frame.time, frame.proxy.len())));
+            }
+            if frame.nodes.len() < surface {
+                return Err(too_few_nodes(frame.time, frame.nodes.len(), surface));
             }
             chain.pose(&frame.proxy, &mut pose);
             let mut forces = vec![DVec3::ZERO; nodes];
@@ -141,8 +153,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     let rest: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
     let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     if let Some(instant) = instants.iter().find(|instant| instant.nodes.len() < rest.len()) {
-        let (time, nodes, surface) = (instant.time, instant.nodes.len(), rest.len());
-        return Err(refused(format!("the frame at {time} s has {nodes} nodes, the dataset's surface {surface}")));
+        return Err(too_few_nodes(instant.time, instant.nodes.len(), rest.len()));
     }
     if instants.is_empty() {
         return Err(refused("the recording has no frames; give the scene a [graphics] table".to_owned()));

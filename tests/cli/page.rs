@@ -1,5 +1,5 @@
 //! Pages for a browser: their numbers are those of the session, and nothing in them ends where it should not or asks for
-//! another file. `docs/site/browser.sh` opens them.
+//! another file. `docs/site/browser.py` opens them.
 
 use crate::report::{arm, counts, dataset, recording, sphere};
 use base64::{Engine, prelude::BASE64_STANDARD};

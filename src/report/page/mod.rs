@@ -72,15 +72,15 @@ pub struct Page<'a> {
 /// Object and arm at some instants.
 pub struct Body {
     /// Nodes of the object's surface at rest (m).
-    pub rest: Vec<DVec3>,
+    rest: Vec<DVec3>,
     /// Its triangles.
-    pub triangles: Vec<[u32; 3]>,
+    triangles: Vec<[u32; 3]>,
     /// The arm.
-    pub chain: Chain,
+    chain: Chain,
     /// Shapes of its links, each with the joint that moves it.
-    pub shapes: Vec<(Option<usize>, Triangles)>,
+    shapes: Vec<(Option<usize>, Triangles)>,
     /// Both, ascending in time; one at least. Nodes that are not on the surface come last, and are not shown.
-    pub instants: Vec<Instant>,
+    instants: Vec<Instant>,
 }
 
 impl Body {
@@ -129,7 +129,8 @@ impl Body {
             .flat_map(|instant| {
                 let displacement = rest.iter().zip(&instant.nodes).flat_map(|(n0, n)| ((*n - *n0) / unit).to_array());
                 let now: Vec<i16> = displacement.map(|u| u.round() as i16).collect();
-                let moved: Vec<i16> = now.iter().zip(&before).map(|(now, before)| now - before).collect();
+                let moved: Vec<i16> =
+                    now.iter().zip(&before).map(|(now, before)| now.saturating_sub(*before)).collect();
                 before = now;
                 moved
             })

@@ -341,7 +341,6 @@ function begin3d() {
     build();
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => { build(); draw3d(); });
-    const { arm: ARM, node: NODE, force: FORCE } = Object.fromEntries(["arm", "node", "force"].map((name) => [name, rgb(scene.palette[name])]));
     const surface = new Float32Array(9 * fromBody.nodes), solids = new Solids();
 
     draw3d = () => {
@@ -349,6 +348,8 @@ function begin3d() {
         const frame = before(body.times, time), next = Math.min(frame + 1, body.times.length - 1);
         const share = next > frame ? Math.min(Math.max((time - body.times[frame]) / (body.times[next] - body.times[frame]), 0), 1) : 0;
         const mixed = (list, size, k) => list[frame * size + k] * (1 - share) + list[next * size + k] * share;
+        // The arm's own colours are for a light sheet.
+        const [ARM, NODE, FORCE] = ["arm", "node", "force"].map((name) => rgb(scene.palette[name]).map((c) => (isDark.matches && name !== "force" ? c + 0.35 * (1 - c) : c)));
         surface.fill(0);
         let largest = 0;
         for (let node = 0; node < nodes; node++) {
@@ -402,7 +403,9 @@ function begin3d() {
         element("state").textContent = (touching ? `In contact: ${touching} nodes of the object, ${digits(Math.hypot(...total), 2)} N` : "Free") + (body.largest ? `; moved by up to ${digits(1e3 * largest, 2)} mm` : "");
 
         const scale = devicePixelRatio || 1;
-        [canvas.width, canvas.height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * scale)));
+        const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * scale)));
+        // To set a size takes new memory, even if it is the same.
+        if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
         gl.viewport(0, 0, canvas.width, canvas.height);
         gl.clearColor(...rgb(css("raised")), 1);
         gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
