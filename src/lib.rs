@@ -120,6 +120,7 @@ pub mod memory;
 mod names;
 mod random;
 mod toml_text;
+mod vtk;
 
 pub(crate) use error::error;
 pub use error::{Error, ErrorKind, Location};

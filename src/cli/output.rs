@@ -13,6 +13,7 @@ use crate::{
     scan::SIGNATURE,
     scene::Scene,
     twin::OBJ,
+    vtk,
 };
 use serde::Serialize;
 use std::{
@@ -61,7 +62,10 @@ impl Content {
         let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
         // A text may name haptize, and be the work of a person: a scene, a script.
         let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg"));
-        let page = holds(b".TH haptize") || begins(b"# The paper's") || begins(page::OPENING.as_bytes());
+        let page = holds(b".TH haptize")
+            || begins(b"# The paper's")
+            || begins(page::OPENING.as_bytes())
+            || begins(vtk::OPENING.as_bytes());
         let archive = begins(b"PK") && holds(b"torque.npy");
         let shape = begins(OBJ.as_bytes());
         let hdf5 = begins(b"\x89HDF") && holds(b"torque");

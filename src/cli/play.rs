@@ -18,7 +18,6 @@ use crate::{
     gridize::with_energy,
     render::{
         live::LiveScene,
-        mcap,
         passivity::Bound,
         realtime::Options,
         recording::Recording,
@@ -26,7 +25,7 @@ use crate::{
         timing::Timing,
         trace::{Summary, Tick, Trace},
     },
-    report::{self as figures, FIGURES, page::Page, twinned::TwinError, write_both},
+    report::{self as figures, FIGURES, mcap::McapSession, page::Page, series, twinned::TwinError, write_both},
     scene::Scene,
     sweep::{Clearance, thin_parts},
 };
@@ -46,6 +45,7 @@ Examples:
   haptize play sphere.haptize --motion hand.csv --seconds 10 --realtime
   haptize play sphere.haptize --record session.csv
   haptize play sphere.haptize --html sphere.html         one page, to be opened by any browser
+  haptize play sphere.haptize --vtu sphere_vtu           a series of files for ParaView
   haptize play sphere.haptize --motion session.mcap
   haptize play organ.toml                                nothing baked: contact is solved in every tick
   haptize play sphere.haptize --replay session.csv
@@ -100,6 +100,10 @@ pub struct Arguments {
     /// C-space, turned by the mouse, and the torque against time.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Write object and arm into this folder as a series of VTU files, with displacement and contact force at each node;
+    /// session.pvd opens it.
+    #[arg(long, value_name = "FOLDER")]
+    vtu: Option<PathBuf>,
     /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -114,7 +118,7 @@ const LONGEST: f64 = 3600.0;
 /// Plays the dataset or the scene.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
-    let Outputs { filled, replaced, earlier_page } = Outputs::check(arguments, &folder)?;
+    let Outputs { filled, replaced, earlier_page, filled_series } = Outputs::check(arguments, &folder)?;
     let live = live(arguments)?;
     let twin = arguments.twin.as_deref().map(|path| twin(path, live.is_some())).transpose()?;
     let dataset = Arc::new(match (&live, &twin) {
@@ -159,7 +163,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut files: Vec<PathBuf> = Vec::new();
     let recorded = arguments.record.as_ref().map(|file| output::untaken(file, replaced.as_ref()));
     if let Some(file) = &recorded {
-        record(&played, arguments, file)?;
+        record(&setup, &dataset, &played, arguments, file)?;
         files.push(file.clone());
     }
     files.push(ticks?);
@@ -181,6 +185,14 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             )?;
             files.push(figures::write(file.clone(), page.html()?.as_bytes())?);
             Some(Written { file: file.display().to_string(), replaced: earlier_page })
+        }
+        None => None,
+    };
+    let series = match arguments.vtu.as_ref().zip(filled_series) {
+        Some((place, filled)) => {
+            let written = series::write(place, &dataset, &setup.chain, trace, setup.haptics.source().live())?;
+            let file = place.join(series::LIST).display().to_string();
+            Some(Series { file, overwritten: filled.close(&written)? })
         }
         None => None,
     };
@@ -217,6 +229,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         twin,
         felt,
         page,
+        series,
         recording: recorded.map(|file| Written {
             file: file.display().to_string(),
             replaced: replaced.filter(|_| Some(&file) == arguments.record.as_ref()),
@@ -259,6 +272,8 @@ struct PlayedSession {
     recording: Option<Written>,
     #[serde(skip_serializing_if = "Option::is_none")]
     page: Option<Written>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    series: Option<Series>,
     #[serde(flatten)]
     overwritten: Overwritten,
     /// What the replay has shown.
@@ -286,6 +301,15 @@ struct Fault {
 struct Driven {
     name: String,
     tally: Tally,
+}
+
+/// A series of VTU files.
+#[derive(Serialize)]
+struct Series {
+    /// The one that names all others.
+    file: String,
+    #[serde(flatten)]
+    overwritten: Overwritten,
 }
 
 impl Describe for PlayedSession {
@@ -325,6 +349,10 @@ impl Describe for PlayedSession {
                 text.row(what, file);
                 replaced.describe(text);
             }
+        }
+        if let Some(Series { file, overwritten }) = &self.series {
+            text.row("series", file);
+            overwritten.describe(text);
         }
         text.row("written to", &self.folder);
         self.overwritten.describe(text);
@@ -441,7 +469,13 @@ fn folder(arguments: &Arguments) -> PathBuf {
 }
 
 /// Writes what `played` recorded to `file`.
-fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Failure> {
+fn record(
+    setup: &Setup,
+    dataset: &Dataset,
+    played: &Played,
+    arguments: &Arguments,
+    file: &Path,
+) -> Result<(), Failure> {
     let lost = played.timing.as_ref().map_or(0, |timing| timing.unrecorded);
     if lost > 0 {
         return Err(
@@ -455,7 +489,15 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
         ]);
         facts.extend(arguments.device.as_ref().map(|device| ("device".to_owned(), device.to_string())));
         facts.insert("tally".into(), serde_json::to_string(&tally(&played.trace))?);
-        replace_file(file, |out| mcap::write(&played.trace, facts, out)).map_err(|error| unwritten(file, error))?;
+        let (chain, live) = (&setup.chain, setup.haptics.source().live());
+        let session = McapSession { dataset, chain, trace: &played.trace, live };
+        // After a signal, and without the object, the joint states are written at the least.
+        let object = if interrupt::is_late() { Ok(None) } else { session.object() };
+        let object = object.unwrap_or_else(|error| {
+            tell(format_args!("haptize: note: {}: the object is left out: {error}", file.display()));
+            None
+        });
+        replace_file(file, |out| session.write(object.as_ref(), facts, out)).map_err(|error| unwritten(file, error))?;
         return Ok(());
     }
     replace_file(file, |out| Recording::write(&played.trace, out)).map_err(|error| unwritten(file, error))?;
@@ -495,6 +537,7 @@ struct Outputs {
     filled: Folder,
     replaced: Option<Replaced>,
     earlier_page: Option<Replaced>,
+    filled_series: Option<Folder>,
 }
 
 impl Outputs {
@@ -504,6 +547,9 @@ impl Outputs {
             [&arguments.dataset].into_iter().chain(&arguments.twin).chain(&arguments.beside).chain(&arguments.replay);
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).chain([Path::new(&arguments.motion)]).collect();
         let mut filled = Folder::check(folder, FILES.into_iter().chain(FIGURES), inputs.clone())?;
+        let series: Vec<String> = series::files(SNAPSHOTS).collect();
+        let check_series = |folder: &PathBuf| Folder::check(folder, series.iter().map(String::as_str), inputs.clone());
+        let filled_series = arguments.vtu.as_ref().map(check_series).transpose()?;
         let mut check = |file: &Option<PathBuf>, content| {
             let Some(file) = file else { return Ok(None) };
             let earlier = output::check(file, content, inputs.clone())?;
@@ -511,6 +557,6 @@ impl Outputs {
         };
         let replaced = check(&arguments.record, Content::Log)?;
         let earlier_page = check(&arguments.html, Content::Product)?;
-        Ok(Self { filled, replaced, earlier_page })
+        Ok(Self { filled, replaced, earlier_page, filled_series })
     }
 }

@@ -20,6 +20,7 @@
 //! | `shape.rs` | its end: what is drawn of the links |
 
 mod arm;
+mod description;
 mod document;
 mod drawn;
 mod group;
@@ -33,6 +34,7 @@ mod surface;
 mod text;
 
 pub use arm::{Arm, ArmJoint, Lock, Note};
+pub use description::description;
 pub use drawn::drawn_shapes;
 pub use link::{Geometry, Inertial, Link, Placed};
 pub use nodes::{ContactNodes, sample};
