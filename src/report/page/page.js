@@ -400,7 +400,9 @@ function begin3d() {
             solids.cone(neck, sum(tail, span), [head / 2, 0], FORCE, 12, true);
         }
         const touching = body.touching[frame];
-        element("state").textContent = (touching ? `In contact: ${touching} nodes of the object, ${digits(Math.hypot(...total), 2)} N` : "Free") + (body.largest ? `; moved by up to ${digits(1e3 * largest, 2)} mm` : "");
+        const contact = touching ? `In contact: ${touching} nodes of the object, ${digits(Math.hypot(...total), 2)} N` : "Free";
+        const isSolved = body.largest || body.force;
+        element("state").textContent = isSolved ? contact + (body.largest ? `; moved by up to ${digits(1e3 * largest, 2)} mm` : "") : "The object at rest";
 
         const scale = devicePixelRatio || 1;
         const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * scale)));
