@@ -120,6 +120,7 @@ pub mod memory;
 mod names;
 mod random;
 mod toml_text;
+mod vtk;
 mod xml;
 
 pub(crate) use error::error;

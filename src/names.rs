@@ -1,7 +1,10 @@
 //! Names from files: of joints, scenes, topics, devices. They are printed in lines and tables, where some characters
 //! would forge a line, hide what stands beside them or command a terminal.
 
-use std::borrow::Cow;
+use std::{
+    borrow::Cow,
+    fmt::{self, Write as _},
+};
 
 /// Whether `c` does more than to be seen: a control character, an end of a line or a paragraph, or one that changes the
 /// direction of text.
@@ -23,6 +26,21 @@ pub(crate) fn escaped_but<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
 /// Returns `text` with its disruptive characters spelt as in JSON, `\u202e`.
 pub(crate) fn escaped(text: &str) -> Cow<'_, str> {
     escaped_but(text, &[])
+}
+
+/// Text as it stands in an element or an attribute of XML or HTML.
+pub(crate) struct Xml<'a>(pub &'a str);
+
+impl fmt::Display for Xml<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.chars().try_for_each(|character| match character {
+            '&' => f.write_str("&amp;"),
+            '<' => f.write_str("&lt;"),
+            '>' => f.write_str("&gt;"),
+            '"' => f.write_str("&quot;"),
+            other => f.write_char(other),
+        })
+    }
 }
 
 /// Returns a number with its noun, in the singular or the plural.

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Makes a site of the documentation: every page that docs/SUMMARY.md lists as HTML, with the contents beside it. rustdoc renders the pages, so
-# that nothing has to be installed beside the toolchain, and no network is there.
+# that nothing has to be installed beside the toolchain, and no network is there. The program runs the commands of docs/gallery.md, and the pages
+# that they write are shown there.
 #
 #   bash docs/site/build.sh [FOLDER]      by default target/site; begin with index.html
 set -euo pipefail
@@ -43,8 +44,18 @@ links() {
     done
 }
 
-mkdir -p "$site"
+mkdir -p "$site/gallery"
 cp docs/site/style.css "$site/"
+program=$({ ls -t target/release/haptize target/debug/haptize 2>/dev/null || true; } | head -n 1)
+[ -n "$program" ] || { cargo build --locked --quiet && program=target/debug/haptize; }
+sed -n '/^```sh$/,/^```$/{/^```/d;p}' docs/gallery.md > "$work/gallery.sh"
+(export PATH=$PWD/$(dirname "$program"):$PATH && cd "$work" && bash -e gallery.sh >gallery.log 2>&1) || { cat "$work/gallery.log"; exit 1; }
+cp "$work"/*.html "$site/gallery/"
+# with_frames FILE: the page with each page that a command of it wrote below the command.
+with_frames() {
+    awk '{ print } match($0, /--html [a-z]+\.html/) { page = substr($0, RSTART + 7, RLENGTH - 7) }
+        /^```$/ && page { print "\n<iframe src=\"gallery/" page "\" title=\"" page "\"></iframe>\n\n[Open the page](gallery/" page ")"; page = "" }' "$1"
+}
 {
     echo '<div class="page"><nav>'
     sed -n -e 's#^\#\# \(.*\)#<h2>\1</h2>#p' -e 's#^- \[\(.*\)\](\(.*\))$#<a href="\2">\1</a>#p' docs/SUMMARY.md |
@@ -55,7 +66,7 @@ echo '</main></div>' > "$work/after.html"
 for page in "${pages[@]}"; do
     name=$(page_name "$page")
     links "docs/$page" > "$work/links.sed"
-    sed -f "$work/links.sed" "docs/$page" > "$work/$name.md"
+    sed -f "$work/links.sed" "docs/$page" | with_frames - > "$work/$name.md"
     rustdoc --edition 2024 --markdown-no-toc --markdown-css style.css --html-before-content "$work/before.html" \
         --html-after-content "$work/after.html" -o "$site" "$work/$name.md"
 done

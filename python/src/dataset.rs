@@ -3,7 +3,7 @@
 use crate::{arrays, errors, threads};
 use haptize::{
     dataset::{self, Format},
-    report,
+    report::{self, page::Page},
 };
 use numpy::{Element, PyArrayDyn, PyArrayMethods, ndarray::ArrayViewD};
 use pyo3::{exceptions::PyValueError, prelude::*};
@@ -69,10 +69,12 @@ impl Dataset {
         threads::detach(py, || self.dataset.save(&path))?.map_err(|error| errors::dataset(py, &error))
     }
 
-    /// Write the dataset for other programs, format "npz", "hdf5" or "csv". Returns the files written.
+    /// Write the dataset for other programs, format "npz", "hdf5", "csv" or "vti". Returns the files written.
     fn export(&self, py: Python<'_>, path: PathBuf, format: &str) -> PyResult<Vec<PathBuf>> {
         let Some(format) = Format::named(format) else {
-            return Err(PyValueError::new_err(format!("no format {format:?}: take \"npz\", \"hdf5\" or \"csv\"")));
+            return Err(PyValueError::new_err(format!(
+                "no format {format:?}: take \"npz\", \"hdf5\", \"csv\" or \"vti\""
+            )));
         };
         threads::detach(py, || self.dataset.export(&path, format))?.map_err(|error| errors::dataset(py, &error))
     }
@@ -195,6 +197,12 @@ impl Dataset {
     /// Sum the dataset up, as `haptize info` does.
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         python_of(py, &self.dataset.summary())
+    }
+
+    /// Object, arm and a plane of C-space as a page that can be turned, in a notebook.
+    pub fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        let page = threads::detach(py, || Page::dataset("Dataset".into(), &self.dataset).frame())?;
+        page.map_err(|error| errors::Error::new_err(error.to_string()))
     }
 
     fn __repr__(&self) -> String {

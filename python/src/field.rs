@@ -273,6 +273,11 @@ impl Field {
         })
     }
 
+    /// The page of the field's dataset.
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        self.dataset.get()._repr_html_(py)
+    }
+
     fn __repr__(&self) -> String {
         format!("Field(joints={})", self.field.joints())
     }

@@ -1,7 +1,7 @@
 //! Scenes from files, texts and dicts.
 
-use crate::errors;
-use haptize::scene;
+use crate::{errors, threads};
+use haptize::{report::page::Page, scene};
 use pyo3::{
     exceptions::{PyAttributeError, PyTypeError},
     prelude::*,
@@ -63,6 +63,12 @@ impl Scene {
     #[getter]
     fn joints(&self) -> Vec<&str> {
         self.scene.proxy.joints.iter().map(|joint| joint.name.as_str()).collect()
+    }
+
+    /// Object and arm as a page that can be turned, in a notebook.
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        let page = threads::detach(py, || Page::scene(&self.scene)?.frame())?;
+        page.map_err(|error| errors::Error::new_err(error.to_string()))
     }
 
     fn __repr__(&self) -> String {

@@ -16,7 +16,8 @@ use std::path::PathBuf;
 Examples:
   haptize export sphere.haptize --format npz
   haptize export sphere.haptize --format hdf5
-  haptize export sphere.haptize --format csv -o tables/sphere.csv")]
+  haptize export sphere.haptize --format csv -o tables/sphere.csv
+  haptize export sphere.haptize --format vti               two or three joints, for ParaView")]
 pub struct Arguments {
     /// The dataset's file.
     dataset: PathBuf,

@@ -170,8 +170,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let inputs = inputs.map(PathBuf::as_path);
     let replaced = output::check(&output, Content::Dataset, inputs.clone())?;
     let names = FELT.into_iter().chain(FIGURES);
-    let folder = arguments.figures.as_ref().map(|folder| Folder::check(folder, names, inputs)).transpose()?;
-    if let Some(folder) = &folder {
+    let mut folder = arguments.figures.as_ref().map(|folder| Folder::check(folder, names, inputs)).transpose()?;
+    if let Some(folder) = &mut folder {
         folder.keep_apart(&output)?;
     }
     let mapping = mapping(arguments)?;

@@ -3,17 +3,24 @@
 use super::{
     Failure,
     info::{self, Body},
+    output::{self, Content, Written},
     report::{Describe, Report, Text},
     tell,
 };
 use crate::{
     ErrorKind, JointVector,
     contact::{Model, NodeForce},
-    dataset::Dataset,
+    dataset::{Dataset, JointLabel, Surface},
     field::TorqueField,
     names::counted,
     object::{LatticeError, Object},
     proxy::Chain,
+    report::{
+        self as figures,
+        object::Instant,
+        page::{self, Page},
+        slices::Plane,
+    },
     scene::{self, AxisSpec, GRID_STEP_SLACK, GridSpec, HapticsSpec, Interpolation, Scene},
     sweep::{Inspection, build_object},
 };
@@ -27,7 +34,8 @@ use std::path::{Path, PathBuf};
 Examples:
   haptize inspect sphere.haptize --q 0.1,1.65,-1.7
   haptize inspect sphere.toml --q=-0.34,1.6,-1.72     with = where the first coordinate is negative
-  haptize inspect sphere.toml --q 50%,50%,90%         in parts of each joint's haptized range")]
+  haptize inspect sphere.toml --q 50%,50%,90%         in parts of each joint's haptized range
+  haptize inspect sphere.haptize --q 50%,50%,90% --html deep.html")]
 pub struct Arguments {
     /// A scene or a dataset.
     file: PathBuf,
@@ -43,6 +51,10 @@ pub struct Arguments {
         value_parser = coordinate
     )]
     q: Vec<Coordinate>,
+    /// Write the configuration into this file as a page for a browser, which needs nothing beside it: object, arm and
+    /// forces, turned by the mouse, and of a dataset a plane of C-space.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
 }
 
 /// A coordinate of the configuration.
@@ -74,6 +86,8 @@ fn coordinate(text: &str) -> Result<Coordinate, String> {
 /// Solves the configuration. For a dataset, also reports what it interpolates there and what it stores at the nearest
 /// grid point.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
+    let check = |file| output::check(file, Content::Product, [arguments.file.as_path()]);
+    let earlier_page = arguments.html.as_deref().map(check).transpose()?.flatten();
     let (scene, object, dataset) = read(&arguments.file)?;
     let chain = Chain::new(&scene.proxy);
     let given = &arguments.q;
@@ -96,7 +110,17 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     object.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
     let dataset = dataset.as_ref();
     let solved = Inspection::new(&model, q);
+    let page = match &arguments.html {
+        Some(file) => {
+            let title = arguments.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let page = page(title, &scene, &object, &chain, dataset, &solved)?;
+            figures::write(file.clone(), page.html()?.as_bytes())?;
+            Some(Written { file: file.display().to_string(), replaced: earlier_page })
+        }
+        None => None,
+    };
     let inspected = Inspected {
+        page,
         interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
         stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
         lattice: object.lattice_error(&model.compliance),
@@ -127,6 +151,8 @@ struct Inspected {
     /// What it stores at the nearest grid point.
     #[serde(skip_serializing_if = "Option::is_none")]
     stored: Option<Stored>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    page: Option<Written>,
     /// Name of each joint, and unit of its coordinate.
     #[serde(skip)]
     joints: Vec<(String, &'static str)>,
@@ -275,7 +301,49 @@ impl Describe for Inspected {
             text.row("torque", efforts(torque));
             info::describe_notices(text, notices);
         }
+        if let Some(Written { file, replaced }) = &self.page {
+            text.row("page", file);
+            replaced.describe(text);
+        }
     }
+}
+
+/// The page of a configuration.
+fn page(
+    title: String,
+    scene: &Scene,
+    object: &Object,
+    chain: &Chain,
+    dataset: Option<&Dataset>,
+    solved: &Inspection,
+) -> Result<Page<'static>, Failure> {
+    let Inspection { q, status, energy, gap, torque, object_nodes, .. } = solved;
+    let forces = object_nodes.iter().enumerate().filter(|(_, node)| node.force != DVec3::ZERO);
+    let forces: Vec<_> = forces.map(|(node, at)| NodeForce { node: node as u32, force: at.force }).collect();
+    let mut pose = chain.new_pose();
+    chain.pose(q, &mut pose);
+    // Of all nodes, where the solver needs those alone that the arm may reach.
+    let mut loads = vec![DVec3::ZERO; object.rest.len()];
+    forces.iter().for_each(|at| loads[at.node as usize] = at.force);
+    let displacement = object.mechanics()?.displacement_under(&loads);
+    let nodes = object.rest.iter().zip(&displacement).map(|(rest, u)| *rest + *u).collect();
+    let instant = Instant { time: 0.0, nodes, contact_nodes: forces.len() as u32, forces, pose };
+    let joints = || chain.joints.iter().map(|joint| (joint.name.as_str(), joint.kind.unit()));
+    let facts = [
+        ("q", numbers(q)),
+        ("status", status.clone()),
+        ("torque", scene::efforts(torque, joints()).to_string()),
+        ("energy", format!("{energy:.6} J")),
+        ("gap", format!("{:.3} mm", gap * 1e3)),
+    ];
+    Ok(Page {
+        title,
+        facts: facts.map(|(what, value)| (what.to_owned(), value)).into(),
+        joints: joints().map(|(name, unit)| JointLabel { name: name.into(), unit: unit.into() }).collect(),
+        body: page::Body::new(&Surface::of(object), chain.clone(), &scene.text, vec![instant]),
+        trace: None,
+        plane: dataset.and_then(|dataset| Plane::of(dataset, Some(q))),
+    })
 }
 
 /// Least weight that is printed: smaller ones would read zero (1).

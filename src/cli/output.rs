@@ -9,9 +9,11 @@ use super::{
 use crate::{
     dataset::{may_be_dataset, replace_file, resolved},
     render::recording::SIGNATURE as SESSION,
+    report::page,
     scan::SIGNATURE,
     scene::Scene,
     twin::OBJ,
+    vtk,
 };
 use serde::Serialize;
 use std::{
@@ -60,7 +62,10 @@ impl Content {
         let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
         // A text may name haptize, and be the work of a person: a scene, a script.
         let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg") || begins(b"GIF89a"));
-        let page = holds(b".TH haptize") || begins(b"# The paper's");
+        let page = holds(b".TH haptize")
+            || begins(b"# The paper's")
+            || begins(page::OPENING.as_bytes())
+            || begins(vtk::OPENING.as_bytes());
         let archive = begins(b"PK") && holds(b"torque.npy");
         let shape = begins(OBJ.as_bytes());
         let hdf5 = begins(b"\x89HDF") && holds(b"torque");
@@ -99,6 +104,16 @@ pub struct Replaced {
     replaced: Earlier,
     #[serde(skip)]
     written: SystemTime,
+}
+
+/// A file that was written.
+#[derive(Serialize)]
+pub struct Written {
+    /// Its name.
+    pub file: String,
+    /// What it has replaced.
+    #[serde(flatten)]
+    pub replaced: Option<Replaced>,
 }
 
 #[derive(Serialize)]
@@ -194,7 +209,7 @@ pub fn rewrite(scene: &Scene, text: &str) -> Result<String, Failure> {
 /// A folder that a command fills with files whose names it knows.
 pub struct Folder {
     path: PathBuf,
-    /// Files that the command may write.
+    /// Files that the command may write, here and elsewhere.
     files: Vec<PathBuf>,
     /// Those of them that are there.
     earlier: Vec<PathBuf>,
@@ -221,16 +236,18 @@ impl Folder {
         Ok(Self { path: path.to_owned(), files, earlier })
     }
 
-    /// Checks that `output`, which the same command writes, is none of the folder's files.
+    /// Checks that `output`, which the same command writes, is none of the folder's files and none of the outputs that
+    /// were checked before.
     ///
     /// # Errors
     /// When it is one of them, which would be written over it.
-    pub fn keep_apart(&self, output: &Path) -> Result<(), Failure> {
-        let output_place = place(output);
-        if self.files.iter().any(|file| place(file) == output_place) {
-            let why = "a file of this name is written into the folder, too; name another file";
+    pub fn keep_apart(&mut self, output: &Path) -> Result<(), Failure> {
+        let output = place(output);
+        if self.files.iter().any(|file| place(file) == output) {
+            let why = "another output of this command is written there, too; name another file";
             return Err(format!("{}: {why}", output.display()).into());
         }
+        self.files.push(output);
         Ok(())
     }
 

@@ -5,7 +5,7 @@ use super::{
     Failure, interrupt,
     keyboard::Keyboard,
     motion,
-    output::{self, Content, Folder, Overwritten, Replaced},
+    output::{self, Content, Folder, Overwritten, Replaced, Written},
     playback_report::{Beside, PlaybackReport},
     played::{FILES, Played, SNAPSHOTS, describe_session, play, play_timed, traced, unwritten, write},
     report::{self, Describe, Report, Text},
@@ -18,7 +18,6 @@ use crate::{
     gridize::with_energy,
     render::{
         live::LiveScene,
-        mcap,
         passivity::Bound,
         realtime::Options,
         recording::Recording,
@@ -26,7 +25,7 @@ use crate::{
         timing::Timing,
         trace::{Summary, Tick, Trace},
     },
-    report::{FIGURES, twinned::TwinError, write_both},
+    report::{self as figures, FIGURES, mcap::McapSession, page::Page, series, twinned::TwinError, write_both},
     scene::Scene,
     sweep::{Clearance, thin_parts},
 };
@@ -45,6 +44,8 @@ Examples:
   haptize play sphere.haptize --motion scrape
   haptize play sphere.haptize --motion hand.csv --seconds 10 --realtime
   haptize play sphere.haptize --record session.csv
+  haptize play sphere.haptize --html sphere.html         one page, to be opened by any browser
+  haptize play sphere.haptize --vtu sphere_vtu           a series of files for ParaView
   haptize play sphere.haptize --motion session.mcap
   haptize play organ.toml                                nothing baked: contact is solved in every tick
   haptize play sphere.haptize --replay session.csv
@@ -95,6 +96,14 @@ pub struct Arguments {
     /// Replay the session in this file and check that it matches bit for bit.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "seconds", "exact", "realtime", "record"])]
     replay: Option<PathBuf>,
+    /// Write the session into this file as a page for a browser, which needs nothing beside it: object, arm, forces and
+    /// C-space, turned by the mouse, and the torque against time.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Write object and arm into this folder as a series of VTU files, with displacement and contact force at each node;
+    /// session.pvd opens it.
+    #[arg(long, value_name = "FOLDER")]
+    vtu: Option<PathBuf>,
     /// The folder to write traces and figures to; by default one in `out/` that is named after dataset and motion.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -109,7 +118,7 @@ const LONGEST: f64 = 3600.0;
 /// Plays the dataset or the scene.
 pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let folder = folder(arguments);
-    let Outputs { filled, replaced } = Outputs::check(arguments, &folder)?;
+    let Outputs { filled, replaced, earlier_page, filled_series } = Outputs::check(arguments, &folder)?;
     let live = live(arguments)?;
     let twin = arguments.twin.as_deref().map(|path| twin(path, live.is_some())).transpose()?;
     let dataset = Arc::new(match (&live, &twin) {
@@ -154,7 +163,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let mut files: Vec<PathBuf> = Vec::new();
     let recorded = arguments.record.as_ref().map(|file| output::untaken(file, replaced.as_ref()));
     if let Some(file) = &recorded {
-        record(&played, arguments, file)?;
+        record(&setup, &dataset, &played, arguments, file)?;
         files.push(file.clone());
     }
     files.push(ticks?);
@@ -164,6 +173,28 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let thin_part = match &live {
         Some(scene) => thin_parts::on_path(scene.direct().model(), &path()),
         None => thin_parts::told(&dataset.provenance.notices),
+    };
+    let page = match &arguments.html {
+        Some(file) => {
+            let page = Page::session(
+                names(arguments).join(": "),
+                &dataset,
+                &setup.chain,
+                trace,
+                setup.haptics.source().live(),
+            )?;
+            files.push(figures::write(file.clone(), page.html()?.as_bytes())?);
+            Some(Written { file: file.display().to_string(), replaced: earlier_page })
+        }
+        None => None,
+    };
+    let series = match arguments.vtu.as_ref().zip(filled_series) {
+        Some((place, filled)) => {
+            let written = series::write(place, &dataset, &setup.chain, trace, setup.haptics.source().live())?;
+            let file = place.join(series::LIST).display().to_string();
+            Some(Series { file, overwritten: filled.close(&written)? })
+        }
+        None => None,
     };
     files.extend(write(&setup, &dataset, &played, &folder)?);
     let twin = setup.haptics.source().twinned().map(|field| TwinError::along(field, trace));
@@ -197,7 +228,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         thin_part,
         twin,
         felt,
-        recording: recorded.map(|file| Record {
+        page,
+        series,
+        recording: recorded.map(|file| Written {
             file: file.display().to_string(),
             replaced: replaced.filter(|_| Some(&file) == arguments.record.as_ref()),
         }),
@@ -236,7 +269,11 @@ struct PlayedSession {
     felt: PlaybackReport,
     files: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    recording: Option<Record>,
+    recording: Option<Written>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    page: Option<Written>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    series: Option<Series>,
     #[serde(flatten)]
     overwritten: Overwritten,
     /// What the replay has shown.
@@ -266,12 +303,13 @@ struct Driven {
     tally: Tally,
 }
 
-/// The record of a session.
+/// A series of VTU files.
 #[derive(Serialize)]
-struct Record {
+struct Series {
+    /// The one that names all others.
     file: String,
     #[serde(flatten)]
-    replaced: Option<Replaced>,
+    overwritten: Overwritten,
 }
 
 impl Describe for PlayedSession {
@@ -306,9 +344,15 @@ impl Describe for PlayedSession {
             }
         }
         self.timing.describe(text);
-        if let Some(Record { file, replaced }) = &self.recording {
-            text.row("recorded in", file);
-            replaced.describe(text);
+        for (what, written) in [("recorded in", &self.recording), ("page", &self.page)] {
+            if let Some(Written { file, replaced }) = written {
+                text.row(what, file);
+                replaced.describe(text);
+            }
+        }
+        if let Some(Series { file, overwritten }) = &self.series {
+            text.row("series", file);
+            overwritten.describe(text);
         }
         text.row("written to", &self.folder);
         self.overwritten.describe(text);
@@ -409,18 +453,29 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Stri
     Ok((Played { trace: trace.into(), timing: None }, told))
 }
 
+/// The names of what is felt, and of the motion by which it is.
+fn names(arguments: &Arguments) -> [String; 2] {
+    let felt = arguments.replay.as_deref().unwrap_or(Path::new(&arguments.motion));
+    [&arguments.dataset, felt].map(|path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned())
+}
+
 /// Returns where traces and figures go.
 fn folder(arguments: &Arguments) -> PathBuf {
-    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let felt = arguments.replay.as_deref().unwrap_or(Path::new(&arguments.motion));
     // Beside what a dataset of the same name gave, not in its place.
     let live = if Scene::is_at(&arguments.dataset) { "-live" } else { "" };
-    let named = || Path::new("out").join(format!("{}{live}-{}", stem(&arguments.dataset), stem(felt)));
+    let [dataset, motion] = names(arguments);
+    let named = || Path::new("out").join(format!("{dataset}{live}-{motion}"));
     arguments.output.clone().unwrap_or_else(named)
 }
 
 /// Writes what `played` recorded to `file`.
-fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Failure> {
+fn record(
+    setup: &Setup,
+    dataset: &Dataset,
+    played: &Played,
+    arguments: &Arguments,
+    file: &Path,
+) -> Result<(), Failure> {
     let lost = played.timing.as_ref().map_or(0, |timing| timing.unrecorded);
     if lost > 0 {
         return Err(
@@ -434,7 +489,15 @@ fn record(played: &Played, arguments: &Arguments, file: &Path) -> Result<(), Fai
         ]);
         facts.extend(arguments.device.as_ref().map(|device| ("device".to_owned(), device.to_string())));
         facts.insert("tally".into(), serde_json::to_string(&tally(&played.trace))?);
-        replace_file(file, |out| mcap::write(&played.trace, facts, out)).map_err(|error| unwritten(file, error))?;
+        let (chain, live) = (&setup.chain, setup.haptics.source().live());
+        let session = McapSession { dataset, chain, trace: &played.trace, live };
+        // After a signal, and without the object, the joint states are written at the least.
+        let object = if interrupt::is_late() { Ok(None) } else { session.object() };
+        let object = object.unwrap_or_else(|error| {
+            tell(format_args!("haptize: note: {}: the object is left out: {error}", file.display()));
+            None
+        });
+        replace_file(file, |out| session.write(object.as_ref(), facts, out)).map_err(|error| unwritten(file, error))?;
         return Ok(());
     }
     replace_file(file, |out| Recording::write(&played.trace, out)).map_err(|error| unwritten(file, error))?;
@@ -473,6 +536,8 @@ fn twin(path: &Path, is_live: bool) -> Result<Arc<LiveScene>, Failure> {
 struct Outputs {
     filled: Folder,
     replaced: Option<Replaced>,
+    earlier_page: Option<Replaced>,
+    filled_series: Option<Folder>,
 }
 
 impl Outputs {
@@ -481,10 +546,17 @@ impl Outputs {
         let read =
             [&arguments.dataset].into_iter().chain(&arguments.twin).chain(&arguments.beside).chain(&arguments.replay);
         let inputs: Vec<&Path> = read.map(PathBuf::as_path).chain([Path::new(&arguments.motion)]).collect();
-        let filled = Folder::check(folder, FILES.into_iter().chain(FIGURES), inputs.clone())?;
-        let record = arguments.record.as_ref().map(|file| output::check(file, Content::Log, inputs));
-        let replaced = record.transpose()?.flatten();
-        arguments.record.iter().try_for_each(|file| filled.keep_apart(file))?;
-        Ok(Self { filled, replaced })
+        let mut filled = Folder::check(folder, FILES.into_iter().chain(FIGURES), inputs.clone())?;
+        let series: Vec<String> = series::files(SNAPSHOTS).collect();
+        let check_series = |folder: &PathBuf| Folder::check(folder, series.iter().map(String::as_str), inputs.clone());
+        let filled_series = arguments.vtu.as_ref().map(check_series).transpose()?;
+        let mut check = |file: &Option<PathBuf>, content| {
+            let Some(file) = file else { return Ok(None) };
+            let earlier = output::check(file, content, inputs.clone())?;
+            filled.keep_apart(file).map(|()| earlier)
+        };
+        let replaced = check(&arguments.record, Content::Log)?;
+        let earlier_page = check(&arguments.html, Content::Product)?;
+        Ok(Self { filled, replaced, earlier_page, filled_series })
     }
 }

@@ -8,7 +8,7 @@ use super::{
     colour::{Colour, WHITE},
     font,
 };
-use crate::{Error, error};
+use crate::{Error, error, names::Xml};
 use std::fmt::{Display, Write as _};
 use tiny_skia::{FillRule, LineCap, LineJoin, Mask, Paint, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 
@@ -336,7 +336,7 @@ impl std::fmt::Display for Mark {
                     style.weight.css(),
                     style.colour,
                     Opacity(style.colour),
-                    Escaped(text)
+                    Xml(text)
                 )
             }
             Self::Clipped { area, marks } => {
@@ -442,19 +442,5 @@ struct Opacity(Colour);
 impl std::fmt::Display for Opacity {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if self.0.opacity < 1.0 { write!(f, r#" opacity="{}""#, Number(self.0.opacity.into())) } else { Ok(()) }
-    }
-}
-
-/// Text with XML's signs replaced.
-struct Escaped<'a>(&'a str);
-
-impl std::fmt::Display for Escaped<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.0.chars().try_for_each(|character| match character {
-            '&' => f.write_str("&amp;"),
-            '<' => f.write_str("&lt;"),
-            '>' => f.write_str("&gt;"),
-            other => f.write_char(other),
-        })
     }
 }

@@ -14,7 +14,6 @@ pub mod graphics;
 pub mod haptic;
 mod inputs;
 pub mod live;
-pub mod mcap;
 pub mod npmi;
 mod object_history;
 mod object_memory;

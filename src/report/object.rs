@@ -20,7 +20,7 @@ use crate::{
     render::{
         graphics::ContactForces,
         live::LiveScene,
-        trace::{Frame, Trace},
+        trace::{Frame, Tick, Trace},
     },
     scene::Rendering,
 };
@@ -43,10 +43,13 @@ pub struct Instant {
     pub pose: Pose,
 }
 
-const LINK: Colour = Colour::hex(0x8d_97_a5);
-const PROXY_NODE: Colour = Colour::hex(0x2b_34_40);
-const FORCE: Colour = Colour::hex(0xd5_5e_00);
+pub(super) const LINK: Colour = Colour::hex(0x8d_97_a5);
+pub(super) const PROXY_NODE: Colour = Colour::hex(0x2b_34_40);
+pub(super) const FORCE: Colour = Colour::hex(0xd5_5e_00);
 const EDGE: Colour = INK.with_opacity(0.28);
+
+/// Radius of the rods that stand for links over the object's (1).
+pub(super) const LINK_THICKNESS: f64 = 0.032;
 
 const WIDTH: f64 = 800.0;
 const COLUMNS: usize = 3;
@@ -64,41 +67,71 @@ pub fn instants(
     count: usize,
     live: Option<Arc<LiveScene>>,
 ) -> Result<Vec<Instant>, Error> {
+    let frames = &trace.frames;
+    let touching = |frame: &Frame| tick(trace, frame).is_some_and(|tick| tick.sample.contact);
+    let first = frames.iter().position(touching).unwrap_or(0).saturating_sub(1);
+    let last = frames.iter().rposition(touching).unwrap_or(frames.len().saturating_sub(1));
+    let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
+    instants_at(dataset, chain, trace, chosen, live)
+}
+
+/// The error of a frame that shows only a part of the surface.
+fn too_few_nodes(time: f64, nodes: usize, surface: usize) -> Error {
+    error!("cannot draw the deformed object: the frame at {time} s has {nodes} nodes, the dataset's surface {surface}")
+}
+
+/// The tick of a frame.
+fn tick<'a>(trace: &'a Trace, frame: &Frame) -> Option<&'a Tick> {
+    let number = trace.ticks.partition_point(|tick| tick.time <= frame.time).checked_sub(1)?;
+    Some(&trace.ticks[number])
+}
+
+/// The instants of those `frames` of a recording; see [`instants`].
+///
+/// # Errors
+/// As there.
+pub fn instants_at<'a>(
+    dataset: &Dataset,
+    chain: &Chain,
+    trace: &'a Trace,
+    frames: impl Iterator<Item = &'a Frame>,
+    live: Option<Arc<LiveScene>>,
+) -> Result<Vec<Instant>, Error> {
     let refused = |reason: String| error!("cannot draw the deformed object: {reason}");
     if chain.joints.len() != dataset.grid.joints() {
         let (joints, axes) = (chain.joints.len(), dataset.grid.joints());
         return Err(refused(format!("the chain has {joints} joints, the dataset {axes}; load both from one scene")));
     }
-    let frames = &trace.frames;
-    let tick = |frame: &Frame| {
-        let number = trace.ticks.partition_point(|tick| tick.time <= frame.time).checked_sub(1)?;
-        Some(&trace.ticks[number])
-    };
-    let touching = |frame: &Frame| tick(frame).is_some_and(|tick| tick.sample.contact);
-    let first = frames.iter().position(touching).unwrap_or(0).saturating_sub(1);
-    let last = frames.iter().rposition(touching).unwrap_or(frames.len().saturating_sub(1));
-    let chosen = (0..count).filter_map(|k| frames.get(first + k * (last - first) / count.saturating_sub(1).max(1)));
+    if trace.frames.is_empty() {
+        return Ok(Vec::new());
+    }
+    let surface = dataset.surface.as_ref().map_or(0, |surface| surface.nodes.len() / 3);
     let mut pose = chain.new_pose();
-    let nodes = frames.iter().map(|frame| frame.nodes.len()).max().unwrap_or(0);
+    let nodes = trace.frames.iter().map(|frame| frame.nodes.len()).max().unwrap_or(0);
     let all = match live {
         Some(scene) => Ok(Some(ContactForces::live(scene))),
         None => ContactForces::known(dataset).then(|| ContactForces::new(dataset, nodes)).transpose(),
     };
     let all = all.map_err(|error| refused(error.to_string()))?;
-    chosen
+    frames
         .map(|frame| {
+            let tick = tick(trace, frame);
+            let is_touching = tick.is_some_and(|tick| tick.sample.contact);
             if frame.proxy.len() != chain.joints.len() {
                 return Err(refused(format!("the frame at {} s has {} joints", frame.time, frame.proxy.len())));
             }
+            if frame.nodes.len() < surface {
+                return Err(too_few_nodes(frame.time, frame.nodes.len(), surface));
+            }
             chain.pose(&frame.proxy, &mut pose);
             let mut forces = vec![DVec3::ZERO; nodes];
-            if let (Some(all), true) = (&all, touching(frame)) {
+            if let (Some(all), true) = (&all, is_touching) {
                 all.at(&frame.proxy, 1.0, &mut forces);
             }
             let acting = forces.into_iter().enumerate().filter(|(_, force)| *force != DVec3::ZERO);
             let forces: Vec<_> = acting.map(|(node, force)| NodeForce { node: node as u32, force }).collect();
             // A store does not say how many nodes are in contact.
-            let contact_nodes = match tick(frame).map_or(0, |tick| tick.sample.contact_nodes) {
+            let contact_nodes = match tick.map_or(0, |tick| tick.sample.contact_nodes) {
                 0 => forces.len() as u32,
                 stored => stored,
             };
@@ -120,14 +153,13 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     let rest: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
     let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     if let Some(instant) = instants.iter().find(|instant| instant.nodes.len() < rest.len()) {
-        let (time, nodes, surface) = (instant.time, instant.nodes.len(), rest.len());
-        return Err(refused(format!("the frame at {time} s has {nodes} nodes, the dataset's surface {surface}")));
+        return Err(too_few_nodes(instant.time, instant.nodes.len(), rest.len()));
     }
     if instants.is_empty() {
         return Err(refused("the recording has no frames; give the scene a [graphics] table".to_owned()));
     }
     let mut scene = Scene::new(chain, &rest, &triangles, instants);
-    scene.links = links(dataset);
+    scene.links = links(&dataset.scene);
     let rows = instants.len().div_ceil(COLUMNS);
     let top = chart::MARGIN + 52.0;
     let mut canvas = Canvas::new(WIDTH, top + rows as f64 * (CELL[1] + 34.0) + 8.0);
@@ -237,7 +269,7 @@ impl<'a> Scene<'a> {
             self.rest.iter().zip(&instant.nodes).map(|pair| self.map.colour(displacement(pair))).collect();
         let nodes = &instant.nodes[..self.rest.len()];
         raster.mesh(nodes, self.triangles, &colours);
-        draw_proxy(&mut raster, self.chain, &instant.pose, 0.032 * self.radius, &self.links);
+        draw_proxy(&mut raster, self.chain, &instant.pose, LINK_THICKNESS * self.radius, &self.links);
         let arrows = self.arrows(instant).into_iter();
         let arrows = arrows.flat_map(|(tail, tip)| Cone::arrow(tail, tip - tail, 0.022 * self.radius, FORCE));
         raster.cones(&arrows.collect::<Vec<_>>());
@@ -246,9 +278,9 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// The shapes of the links in the scene of `dataset`; none where it says nothing of them.
-fn links(dataset: &Dataset) -> Vec<(Option<usize>, Triangles)> {
-    let shapes = Rendering::parse(&dataset.scene, "scene").map(|scene| scene.shapes).unwrap_or_default();
+/// The shapes of the links in the text of a `scene`; none where it says nothing of them.
+pub(super) fn links(scene: &str) -> Vec<(Option<usize>, Triangles)> {
+    let shapes = Rendering::parse(scene, "scene").map(|scene| scene.shapes).unwrap_or_default();
     shapes.iter().map(|shape| (shape.joint, shape_triangles(shape))).collect()
 }
 
@@ -271,7 +303,7 @@ pub(crate) fn draw_proxy(
 }
 
 /// From the side of the arm and a little from where it pushes, above: the dent is seen in profile.
-fn view(centre: DVec3, instants: &[Instant], force: DVec3) -> DVec3 {
+pub(super) fn view(centre: DVec3, instants: &[Instant], force: DVec3) -> DVec3 {
     let flat = |v: DVec3| DVec3::new(v.x, v.y, 0.0).normalize_or_zero();
     let base = instants.first().and_then(|instant| instant.pose.origins.first()).copied().unwrap_or(centre - DVec3::Y);
     let arm = flat(centre - base);

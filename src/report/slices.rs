@@ -29,7 +29,7 @@ pub fn slices(dataset: &Dataset, through: Option<&[f64]>) -> Canvas {
     if dataset.grid.joints() < 2 {
         return line(dataset);
     }
-    let slice = Slice::worth_showing(dataset, through.and_then(|q| dataset.grid.nearest(q)));
+    let slice = Slice::worth_showing(dataset, through, MOST_CELLS);
     // Four are better two by two than three and one.
     let columns = if dataset.grid.joints() == 4 { 2 } else { dataset.grid.joints().min(3) };
     let rows = dataset.grid.joints().div_ceil(columns);
@@ -70,6 +70,61 @@ struct Slice {
     strides: [usize; 2],
 }
 
+/// Most cells along a side of a [`Plane`]: what 30 kB a joint hold.
+const MOST_PLANE_CELLS: usize = 80;
+
+/// The torque over two joints, to be drawn elsewhere.
+pub struct Plane {
+    /// The joints across and up.
+    pub axes: [usize; 2],
+    /// Their coordinates in the first cell (rad or m).
+    pub start: [f64; 2],
+    /// From one cell to the next (rad or m).
+    pub step: [f64; 2],
+    /// Cells along each.
+    pub count: [usize; 2],
+    /// Torque (N m or N), joint by joint, each row by row; NaN where nothing is known, zero where the arm is free.
+    pub torque: Vec<f64>,
+    /// Torque of each joint at which its colours end (N m or N).
+    pub bounds: Vec<f64>,
+    /// Segments of the contact boundary (rad or m).
+    pub boundary: Vec<[(f64, f64); 2]>,
+    /// The configuration through which it was laid (rad or m).
+    pub at: Option<[f64; 2]>,
+    /// Where it lies.
+    pub caption: String,
+}
+
+impl Plane {
+    /// The plane of [`slices`]; none of a dataset of a single joint.
+    #[must_use]
+    pub fn of(dataset: &Dataset, through: Option<&[f64]>) -> Option<Self> {
+        if dataset.grid.joints() < 2 {
+            return None;
+        }
+        let slice = Slice::worth_showing(dataset, through, MOST_PLANE_CELLS);
+        let count = slice.cells(dataset);
+        let place = |(x, y): (f64, f64)| (slice.coordinate(dataset, 0, x), slice.coordinate(dataset, 1, y));
+        let value = |cell, joint| match dataset.status(slice.point(dataset, cell)) {
+            Status::Free => 0.0,
+            _ => slice.torque(dataset, cell, joint),
+        };
+        let joints = 0..dataset.grid.joints();
+        let cells = |joint| (0..count[1]).flat_map(move |y| (0..count[0]).map(move |x| ([x, y], joint)));
+        Some(Self {
+            axes: slice.axes,
+            start: [0, 1].map(|side| slice.coordinate(dataset, side, 0.0)),
+            step: [0, 1].map(|side| slice.coordinate(dataset, side, 1.0) - slice.coordinate(dataset, side, 0.0)),
+            count,
+            torque: joints.clone().flat_map(cells).map(|(cell, joint)| value(cell, joint)).collect(),
+            bounds: joints.map(|joint| slice.bound(dataset, joint)).collect(),
+            boundary: slice.boundary(dataset, count).into_iter().map(|ends| ends.map(place)).collect(),
+            at: through.map(|q| slice.axes.map(|axis| q[axis])),
+            caption: slice.caption(dataset),
+        })
+    }
+}
+
 /// Number of points and size of torques on a plane.
 #[derive(Default)]
 struct Tally {
@@ -98,8 +153,9 @@ impl Tally {
 }
 
 impl Slice {
-    fn worth_showing(dataset: &Dataset, through: Option<usize>) -> Self {
+    fn worth_showing(dataset: &Dataset, through: Option<&[f64]>, most_cells: usize) -> Self {
         let grid = &dataset.grid;
+        let through = through.and_then(|q| grid.nearest(q));
         let joints = grid.joints();
         let mut best = (Worth::default(), [0, 1], 0);
         for across in 0..joints {
@@ -117,7 +173,7 @@ impl Slice {
             }
         }
         let (_, axes, origin) = best;
-        Self { axes, origin, strides: axes.map(|axis| grid.axes[axis].count.div_ceil(MOST_CELLS).max(1)) }
+        Self { axes, origin, strides: axes.map(|axis| grid.axes[axis].count.div_ceil(most_cells).max(1)) }
     }
 
     /// `point` moved to index zero on both axes.
@@ -157,16 +213,21 @@ impl Slice {
         if greatest > OUTLYING * most { (most, true) } else { (greatest, false) }
     }
 
+    /// The size of torque at the end of the colour map of `joint` (N m or N). A joint that hardly feels anything is drawn
+    /// pale beside those of its unit, not as vividly as these.
+    fn bound(&self, dataset: &Dataset, joint: usize) -> f64 {
+        let greatest = |joint: usize| self.end(dataset, joint).0;
+        let of_unit =
+            (0..dataset.grid.joints()).filter(|other| dataset.grid.axes[*other].unit == dataset.grid.axes[joint].unit);
+        let bound = greatest(joint).max(LEAST_SHARE * of_unit.map(greatest).fold(0.0, f64::max));
+        if bound > 0.0 { bound } else { 1.0 }
+    }
+
     fn draw(&self, canvas: &mut Canvas, dataset: &Dataset, joint: usize, area: Area) {
         let cells = self.cells(dataset);
         let torque = |cell, joint: usize| self.torque(dataset, cell, joint);
         let all = || (0..cells[0]).flat_map(|x| (0..cells[1]).map(move |y| [x, y]));
-        let greatest = |joint: usize| self.end(dataset, joint).0;
-        // A joint that hardly feels anything is drawn pale beside those of its unit, not as vividly as these.
-        let of_unit =
-            (0..dataset.grid.joints()).filter(|other| dataset.grid.axes[*other].unit == dataset.grid.axes[joint].unit);
-        let bound = greatest(joint).max(LEAST_SHARE * of_unit.map(greatest).fold(0.0, f64::max));
-        let map = ColourMap::Diverging { bound: if bound > 0.0 { bound } else { 1.0 } };
+        let map = ColourMap::Diverging { bound: self.bound(dataset, joint) };
         let panel = Panel { area, across: self.scale(dataset, 0), up: self.scale(dataset, 1) };
         panel.grid(canvas, true);
         canvas.rectangle(area, colour::ABSENT);

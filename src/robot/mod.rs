@@ -18,6 +18,7 @@
 //! | `practice.rs` | a soft ball within reach, and a grid and a motion that press it |
 //! | `text.rs` | the scene file |
 //! | `shape.rs` | its end: what is drawn of the links |
+//! | `urdf_writer.rs` | an arm as URDF, for programs that show robots |
 
 mod arm;
 mod description;
@@ -32,9 +33,11 @@ mod shape;
 mod surface;
 mod text;
 mod urdf;
+mod urdf_writer;
 
 pub use arm::{Arm, ArmJoint, Lock, Note};
 pub use description::{Geometry, Inertial, Joint, JointType, Link, Mimic, Placed, Robot};
 pub use drawn::drawn_shapes;
 pub use nodes::{ContactNodes, sample};
 pub use text::write_scene;
+pub use urdf_writer::description;

@@ -32,6 +32,20 @@ impl Encoder {
         self.0.extend(value.to_le_bytes());
     }
 
+    pub fn u8(&mut self, value: u8) {
+        self.0.push(value);
+    }
+
+    pub fn f32(&mut self, value: f32) {
+        self.align(4);
+        self.0.extend(value.to_le_bytes());
+    }
+
+    pub fn f64(&mut self, value: f64) {
+        self.align(8);
+        self.0.extend(value.to_le_bytes());
+    }
+
     pub fn string(&mut self, text: &str) {
         self.u32(text.len() as u32 + 1);
         self.0.extend(text.as_bytes());
@@ -40,10 +54,7 @@ impl Encoder {
 
     pub fn f64s(&mut self, values: &[f64]) {
         self.u32(values.len() as u32);
-        for value in values {
-            self.align(8);
-            self.0.extend(value.to_le_bytes());
-        }
+        values.iter().for_each(|value| self.f64(*value));
     }
 
     pub fn finish(self) -> Vec<u8> {

@@ -1,25 +1,11 @@
 //! `sensor_msgs/msg/JointState`.
 
-use super::cdr::{Decoder, Encoder};
+use super::{
+    cdr::{Decoder, Encoder},
+    message::{Message, NANOSECONDS, header},
+};
 use crate::names;
 use std::collections::HashSet;
-
-/// Text of the message's definition, as MCAP files carry it. Field names and types are those of ROS 2.
-pub(super) const SCHEMA: &str = "\
-std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-";
 
 /// State of some joints at an instant. Each of the three lists is empty or has one number for each name.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,23 +24,39 @@ pub struct JointState {
     pub effort: Vec<f64>,
 }
 
-/// Nanoseconds of a second.
-const NANOSECONDS: u64 = 1_000_000_000;
+impl Message for JointState {
+    const TYPE: &str = "sensor_msgs/msg/JointState";
+    const SCHEMA: &str = "\
+std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+";
 
-impl JointState {
-    /// Returns the message in CDR, little-endian.
-    #[must_use]
-    pub fn encode(&self) -> Vec<u8> {
+    fn stamp(&self) -> u64 {
+        self.stamp
+    }
+
+    fn encode(&self) -> Vec<u8> {
         let mut encoder = Encoder::new();
-        encoder.u32((self.stamp / NANOSECONDS) as u32);
-        encoder.u32((self.stamp % NANOSECONDS) as u32);
-        encoder.string(&self.frame);
+        header(&mut encoder, self.stamp, &self.frame);
         encoder.u32(self.names.len() as u32);
         self.names.iter().for_each(|name| encoder.string(name));
         [&self.position, &self.velocity, &self.effort].into_iter().for_each(|values| encoder.f64s(values));
         encoder.finish()
     }
+}
 
+impl JointState {
     /// Reads a message in CDR of either byte order.
     ///
     /// # Errors

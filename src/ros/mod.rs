@@ -1,27 +1,31 @@
 //! Messages of ROS 2 in MCAP files, read and written without ROS.
 //!
-//! An MCAP file holds messages of many topics; here those of type `sensor_msgs/msg/JointState` count: names, positions,
-//! velocities and efforts of joints at an instant. Files are written without compression; chunks compressed by
-//! lz4 or zstd are read.
+//! An MCAP file holds messages of many topics. Those of type `sensor_msgs/msg/JointState` are read: names, positions,
+//! velocities and efforts of joints at an instant. What viewers show beside them is written. Files are written without
+//! compression; chunks compressed by lz4 or zstd are read.
 
 mod cdr;
 mod chunk;
 mod course;
 mod joint_state;
+mod message;
 mod messages;
+mod shown;
 mod table;
 mod write;
 
 pub use course::Course;
 pub use joint_state::JointState;
+pub use message::Message;
+pub use shown::{Form, Marker, Markers, RobotDescription, Transforms, WORLD};
 pub use table::{JointStateTable, Topic, is_mcap, topics};
-pub use write::JointStateWriter;
+pub use write::MessageWriter;
 
 use crate::Error;
 use std::path::Path;
 
-/// Name of the message type.
-const TYPE: &str = "sensor_msgs/msg/JointState";
+/// Name of the message type that is read.
+const TYPE: &str = <JointState as Message>::TYPE;
 
 /// Most joints of a topic: ten times as many as those of a humanoid with hands.
 const MOST_JOINTS: usize = 1 << 10;

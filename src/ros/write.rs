@@ -1,6 +1,6 @@
-//! An MCAP file of joint states.
+//! An MCAP file of messages.
 
-use super::{JointState, MESSAGE_ENCODING, SCHEMA_ENCODING, TYPE, joint_state::SCHEMA};
+use super::{MESSAGE_ENCODING, SCHEMA_ENCODING, message::Message};
 use mcap::{
     WriteOptions, Writer,
     records::{MessageHeader, Metadata},
@@ -12,9 +12,8 @@ use std::{
 };
 
 /// A file under way.
-pub struct JointStateWriter<W: Write> {
+pub struct MessageWriter<W: Write> {
     writer: Writer<NoSeek<W>>,
-    schema: u16,
     sequence: u32,
 }
 
@@ -25,39 +24,38 @@ fn failed(error: mcap::McapError) -> io::Error {
     }
 }
 
-impl<W: Write> JointStateWriter<W> {
+impl<W: Write> MessageWriter<W> {
     /// Begins a file in `out`.
     ///
     /// # Errors
     /// Those of `out`.
     pub fn new(out: W) -> io::Result<Self> {
         let options = WriteOptions::new().compression(None).profile("ros2").library("haptize").disable_seeking(true);
-        let mut writer = options.create(NoSeek::new(out)).map_err(failed)?;
-        let schema = writer.add_schema(TYPE, SCHEMA_ENCODING, SCHEMA.as_bytes()).map_err(failed)?;
-        Ok(Self { writer, schema, sequence: 0 })
+        Ok(Self { writer: options.create(NoSeek::new(out)).map_err(failed)?, sequence: 0 })
     }
 
-    /// Adds a topic; returns its number.
+    /// Adds a topic of messages `M`; returns its number.
     ///
     /// # Errors
     /// Those of the file.
-    pub fn topic(&mut self, name: &str) -> io::Result<u16> {
-        self.writer.add_channel(self.schema, name, MESSAGE_ENCODING, &BTreeMap::new()).map_err(failed)
+    pub fn topic<M: Message>(&mut self, name: &str) -> io::Result<u16> {
+        let schema = self.writer.add_schema(M::TYPE, SCHEMA_ENCODING, M::SCHEMA.as_bytes()).map_err(failed)?;
+        self.writer.add_channel(schema, name, MESSAGE_ENCODING, &BTreeMap::new()).map_err(failed)
     }
 
-    /// Appends `state` to `topic`, at the time of its stamp.
+    /// Appends `message` to `topic`, at the time of its stamp.
     ///
     /// # Errors
     /// Those of the file.
-    pub fn write(&mut self, topic: u16, state: &JointState) -> io::Result<()> {
+    pub fn write(&mut self, topic: u16, message: &impl Message) -> io::Result<()> {
         self.sequence = self.sequence.wrapping_add(1);
         let header = MessageHeader {
             channel_id: topic,
             sequence: self.sequence,
-            log_time: state.stamp,
-            publish_time: state.stamp,
+            log_time: message.stamp(),
+            publish_time: message.stamp(),
         };
-        self.writer.write_to_known_channel(&header, &state.encode()).map_err(failed)
+        self.writer.write_to_known_channel(&header, &message.encode()).map_err(failed)
     }
 
     /// Appends a record of names and values that are no messages, and ends the file.

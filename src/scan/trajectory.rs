@@ -11,7 +11,7 @@ use crate::{
     JointVector,
     csv::{Table, plain},
     dataset::JointLabel,
-    ros::{JointState, JointStateWriter},
+    ros::{JointState, MessageWriter},
 };
 use std::{
     collections::BTreeMap,
@@ -75,8 +75,8 @@ impl Trajectory {
     /// Those of `out`.
     pub fn write_mcap(&self, joints: &[JointLabel], out: impl Write) -> io::Result<()> {
         let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
-        let mut writer = JointStateWriter::new(out)?;
-        let topic = writer.topic("/plan")?;
+        let mut writer = MessageWriter::new(out)?;
+        let topic = writer.topic::<JointState>("/plan")?;
         for (time, q) in &self.rows {
             let stamp = (time * 1e9).round() as u64;
             let state = JointState { stamp, names: names.clone(), position: q.to_vec(), ..JointState::default() };

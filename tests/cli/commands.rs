@@ -267,6 +267,23 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
         let [a, b] = ["first", "again"].map(|folder| std::fs::read(path(folder).join(file)).unwrap());
         assert!(a == b, "{file} differs");
     }
+    // A page: replaced by its like, and by nothing else; never where another output goes.
+    let paged = |file: &str| play(&["--html", file, "-o", "again"]);
+    assert!(paged("page.html")["page"].get("replaced").is_none());
+    assert_eq!(paged("page.html")["page"]["file"], "page.html");
+    assert!(paged("page.html")["page"]["replaced"]["bytes"].as_u64() > Some(10_000));
+    std::fs::write(path("mine.html"), "<p>by hand</p>").unwrap();
+    for (arguments, expected) in [
+        (["--html", "mine.html", "-o", "again"], "not a table or figure of haptize"),
+        (["--html", "a.mcap", "--record", "a.mcap"], "another output of this command"),
+        (["--html", "again/trace.csv", "-o", "again"], "another output of this command"),
+    ] {
+        let output = haptize(folder.path(), &[&["play", "finger.haptize"], &arguments[..]].concat());
+        assert!(text(&output.stderr).contains(expected), "{arguments:?}: {}", text(&output.stderr));
+    }
+    assert_eq!(std::fs::read_to_string(path("mine.html")).unwrap(), "<p>by hand</p>");
+    let inspected = json(folder.path(), &["inspect", "finger.haptize", "--q", "50%", "--html", "page.html", "--json"]);
+    assert!(inspected["page"]["replaced"]["bytes"].as_u64() > Some(10_000), "{inspected}");
     // A device that leaps: torque to zero, the reason, and no success.
     std::fs::write(path("leap.csv"), "0,0\n0.1,0\n0.101,0.25\n0.2,0.25\n").unwrap();
     let output = haptize(folder.path(), &["play", "finger.haptize", "--motion", "leap.csv", "--exact", "--json"]);

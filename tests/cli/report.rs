@@ -31,7 +31,7 @@ use std::{collections::BTreeSet, path::PathBuf, sync::Arc, time::Duration};
 const CENTRE: DVec3 = DVec3::new(0.2, 0.0, -0.02);
 const RADIUS: f64 = 0.05;
 
-fn sphere() -> Object {
+pub fn sphere() -> Object {
     let shape = Shape::Sphere { centre: CENTRE, radius: RADIUS, rings: 10, segments: 10 };
     Object::build(&ObjectSpec {
         shape,
@@ -45,7 +45,7 @@ fn sphere() -> Object {
 }
 
 /// An arm whose first joint turns about the vertical and whose others bend downwards, nodes along the last two links.
-fn arm(joints: usize) -> Chain {
+pub fn arm(joints: usize) -> Chain {
     let length = 0.3 / (joints.max(2) - 1) as f64;
     let joint = |number: usize| JointSpec {
         name: ["base", "shoulder", "elbow", "wrist", "hand", "finger"][number].to_owned(),
@@ -100,7 +100,7 @@ fn touch(chain: &Chain, object: &Object, q: &[f64]) -> (JointVector, Vec<(u32, D
 }
 
 /// A dataset of an arm over a sphere, without solving anything: good enough to look at.
-fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
+pub fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
     let starts = [-0.5, 0.1, -0.1, -0.2, -0.2, -0.2];
     let axis = |(number, &count): (usize, &usize)| Axis {
         name: chain.joints[number].name.clone(),
@@ -133,7 +133,7 @@ fn dataset(chain: &Chain, object: &Object, counts: &[usize]) -> Dataset {
 }
 
 /// A press into the sphere between 0.6 s and 2.4 s.
-fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
+pub fn recording(chain: &Chain, object: &Object, ticks: usize) -> Trace {
     let joints = chain.joints.len();
     let push = |time: f64| (std::f64::consts::PI * (time - 0.5) / 2.0).sin().max(0.0);
     let tick = |index: usize| {
@@ -259,7 +259,7 @@ fn ink(canvas: &Canvas) -> f64 {
 }
 
 /// Counts of grid points that keep chains of one to six joints small.
-fn counts(joints: usize) -> &'static [usize] {
+pub fn counts(joints: usize) -> &'static [usize] {
     [&[30][..], &[12, 30], &[7, 24, 5], &[5, 12, 4, 3], &[3, 9, 3, 2, 2], &[3, 8, 2, 2, 2, 2]][joints - 1]
 }
 

@@ -9,7 +9,7 @@ use haptize::{
     gridize::{GridizeOptions, Reversals, gridize_sliding},
     logs::{Effort, Keep, Mapping, import},
     proxy::Chain,
-    ros::{Course, JointState, JointStateTable, JointStateWriter, is_mcap, topics},
+    ros::{Course, JointState, JointStateTable, Message, MessageWriter, is_mcap, topics},
     scan::{Plan, Trajectory, labels},
     scene::ScanScene,
 };
@@ -23,10 +23,10 @@ use std::{
 /// A file of `states`, each with its topic.
 fn file(folder: &Path, name: &str, states: &[(&str, JointState)]) -> PathBuf {
     let path = folder.join(name);
-    let mut writer = JointStateWriter::new(fs::File::create(&path).unwrap()).unwrap();
+    let mut writer = MessageWriter::new(fs::File::create(&path).unwrap()).unwrap();
     let mut known: BTreeMap<&str, u16> = BTreeMap::new();
     for (topic, state) in states {
-        let number = *known.entry(topic).or_insert_with(|| writer.topic(topic).unwrap());
+        let number = *known.entry(topic).or_insert_with(|| writer.topic::<JointState>(topic).unwrap());
         writer.write(number, state).unwrap();
     }
     writer.finish(BTreeMap::new()).unwrap();

@@ -1,8 +1,9 @@
-//! Datasets for other programs: NumPy archives, HDF5 and comma-separated text.
+//! Datasets for other programs: NumPy archives, HDF5, comma-separated text and VTK's image data.
 
 mod csv;
 mod hdf5;
 mod npz;
+mod vti;
 
 use super::{Axis, Dataset};
 use crate::Error;
@@ -17,6 +18,8 @@ pub enum Format {
     Hdf5,
     /// Comma-separated text, one row a grid point, and a second file with one row a contact force.
     Csv,
+    /// VTK's image data, of two or three joints: torque, energy, gap and status as ParaView opens them.
+    Vti,
 }
 
 impl Format {
@@ -33,6 +36,7 @@ impl Format {
             Self::Npz => "npz",
             Self::Hdf5 => "h5",
             Self::Csv => "csv",
+            Self::Vti => "vti",
         }
     }
 
@@ -57,12 +61,13 @@ impl Dataset {
     /// Exports the dataset to `path`, replacing it whole or not at all; returns the files written.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// When the system refuses, or the format has no room for so many joints.
     pub fn export(&self, path: &Path, format: Format) -> Result<Vec<PathBuf>, Error> {
         match format {
             Format::Npz => npz::export(self, path),
             Format::Hdf5 => hdf5::export(self, path),
             Format::Csv => csv::export(self, path),
+            Format::Vti => vti::export(self, path),
         }
     }
 }

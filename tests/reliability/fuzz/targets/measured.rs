@@ -4,7 +4,7 @@ use super::{Random, Target, mutate, outcome, shipped, write};
 use haptize::{
     gridize::{GridizeOptions, Interpolation, Samples, WITHIN, gridize},
     logs::{Effort, Mapping, import},
-    ros::{JointState, JointStateTable, topics},
+    ros::{JointState, JointStateTable, Message, topics},
     scan::ScanLog,
 };
 use std::{collections::BTreeMap, path::Path};
