@@ -59,7 +59,7 @@ impl Content {
         let begins = |magic: &[u8]| start.starts_with(magic);
         let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
         // A text may name haptize, and be the work of a person: a scene, a script.
-        let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg"));
+        let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg") || begins(b"GIF89a"));
         let page = holds(b".TH haptize") || begins(b"# The paper's");
         let archive = begins(b"PK") && holds(b"torque.npy");
         let shape = begins(OBJ.as_bytes());

@@ -203,7 +203,11 @@ impl<'object> ObjectMotion<'object> {
     /// v_hat from the right-hand side, and the new state. An object at rest that nothing touches costs nothing.
     fn advance(&mut self) {
         let at_rest = self.right.iter().all(|right| *right == DVec3::ZERO);
-        let solve = |factor: &Factor, right: &mut [DVec3]| if !at_rest { factor.solve(right) };
+        let solve = |factor: &Factor, right: &mut [DVec3]| {
+            if !at_rest {
+                factor.solve(right)
+            }
+        };
         let Some(Dynamics { factor, velocity, .. }) = &mut self.dynamics else {
             solve(&self.mechanics.factor, &mut self.right);
             self.displacement.copy_from_slice(&self.right);

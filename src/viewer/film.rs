@@ -86,6 +86,7 @@ fn write(path: &Path, taken: &mpsc::Receiver<Still>) -> Result<(), Error> {
     let written = replace_file(path, |file| {
         let mut encoder = gif::Encoder::new(file, width, height, &[]).map_err(io::Error::other)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(io::Error::other)?;
+        encoder.write_raw_extension(gif::Extension::Comment.into(), &[b"haptize"]).map_err(io::Error::other)?;
         for (_, mut bytes) in std::iter::once(first).chain(taken.iter()) {
             let mut frame = gif::Frame::from_rgba_speed(width, height, &mut bytes, COARSENESS);
             frame.delay = DELAY;
@@ -116,7 +117,7 @@ mod tests {
         let file = film(folder.path().join("a.gif")).unwrap();
         let mut decoder = gif::DecodeOptions::new();
         decoder.set_color_output(gif::ColorOutput::RGBA);
-        let mut decoder = decoder.read_info(fs::File::open(file).unwrap()).unwrap();
+        let mut decoder = decoder.read_info(fs::File::open(&file).unwrap()).unwrap();
         assert_eq!((decoder.width(), decoder.height()), (4, 3));
         for shade in [0_u8, 100, 200] {
             let frame = decoder.read_next_frame().unwrap().unwrap();
@@ -124,6 +125,8 @@ mod tests {
             assert!(frame.buffer[0].abs_diff(shade) < 4, "{} is not {shade}", frame.buffer[0]);
         }
         assert!(decoder.read_next_frame().unwrap().is_none());
+        // So that another may take its place.
+        assert!(fs::read(&file).unwrap().windows(7).any(|part| part == b"haptize"));
         let stills = film(folder.path().join("b")).unwrap();
         assert_eq!(fs::read_dir(&stills).unwrap().count(), 3);
         // What is there stays.
