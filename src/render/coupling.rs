@@ -61,12 +61,13 @@ impl Coupling {
         contact: &JointVector,
         stops: Stops,
     ) -> Load {
-        let (mut damping, mut torque) = ([[0.0; MAX_JOINTS]; MAX_JOINTS], *contact);
+        let damping = [[0.0; MAX_JOINTS]; MAX_JOINTS];
+        let mut load = Load { stiffness: self.stiffness, target: *position, damping, torque: *contact, stops };
         for a in 0..position.len() {
-            damping[a][a] = self.proxy_damping[a] + self.damping[a];
-            torque[a] += self.damping[a] * velocity[a];
+            load.damping[a][a] = self.proxy_damping[a] + self.damping[a];
+            load.torque[a] += self.damping[a] * velocity[a];
         }
-        Load { stiffness: self.stiffness, target: *position, damping, torque, stops }
+        load
     }
 
     /// 1/2 Kvc |x - y|^2 (J).

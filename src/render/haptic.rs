@@ -26,9 +26,7 @@ use super::{
     watchdog::{self, GREATEST_POSITION_AGE, TickRate, Watchdog},
 };
 use crate::{
-    Error, JointVector,
-    contact::Slip,
-    error,
+    Error, JointVector, error,
     field::{Sample, range::HaptizedRange},
     scene::HapticsSpec,
 };
@@ -357,10 +355,10 @@ impl Haptics {
             rate = control.proxy_rate(&state.accounts, interval, &state.motion);
             stage.add_inertia(rate, &mut load.damping);
         }
-        let slip = self.slips.then(|| {
-            let slip = contact.slip(&state.motion.position, elastic);
-            Slip { normal_force: remembered.share * slip.normal_force, ..slip }
-        });
+        let mut slip = self.slips.then(|| contact.slip(&state.motion.position, elastic));
+        if let Some(slip) = &mut slip {
+            slip.normal_force *= remembered.share;
+        }
         let mut drag = None;
         if let (Some(relaxation), Some(memory), Some(slip)) = (&self.relaxation, &state.memory, &slip) {
             let damper = relaxation.drag(memory, elastic.energy, slip, &state.proxy_velocity, &mut load);

@@ -200,14 +200,16 @@ impl<'object> ObjectMotion<'object> {
         }
     }
 
-    /// v_hat from the right-hand side, and the new state.
+    /// v_hat from the right-hand side, and the new state. An object at rest that nothing touches costs nothing.
     fn advance(&mut self) {
+        let at_rest = self.right.iter().all(|right| *right == DVec3::ZERO);
+        let solve = |factor: &Factor, right: &mut [DVec3]| if !at_rest { factor.solve(right) };
         let Some(Dynamics { factor, velocity, .. }) = &mut self.dynamics else {
-            self.mechanics.factor.solve(&mut self.right);
+            solve(&self.mechanics.factor, &mut self.right);
             self.displacement.copy_from_slice(&self.right);
             return;
         };
-        factor.solve(&mut self.right);
+        solve(factor, &mut self.right);
         for (node, v_hat) in self.right.iter().enumerate() {
             self.displacement[node] += self.period * v_hat;
             velocity[node] = 2.0 * v_hat - velocity[node];
