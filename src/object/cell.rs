@@ -8,7 +8,8 @@ use super::{corners, inclusion::Materials, lattice::Lattice, level::Level, solid
 use crate::{memory, scene::ElasticSpec};
 use glam::DVec3;
 
-/// Factor of a solid over n^(4/3) (B): 650 to 790 in blocks of 4,000 to 16,000 nodes.
+/// Factor of a solid over n^(4/3) (B): 650 to 900 up to 16,000 nodes. At 31,000 it is 1,130, for which the other half of
+/// the memory has room.
 const FACTOR: f64 = 800.0;
 
 /// By how much more it is where a skin with a bending stiffness couples cubes around each node of the surface (1): 4.6
