@@ -1,15 +1,15 @@
 //! The size of the cubes that a solid gets by itself: what contact asks for, or what memory and time allow.
 //!
-//! Nested dissection leaves O(n^(4/3)) entries in the factor of a solid of n nodes, and takes O(n^2) operations (George,
-//! Nested dissection of a regular finite element mesh, 1973). So nodes are counted, and nothing is factorised, to tell
-//! what cubes of a size would take.
+//! Nested dissection leaves O(n^(4/3)) entries in the factor of a solid of n nodes, and takes O(n^2) operations
+//! (George, Nested dissection of a regular finite element mesh, 1973). So nodes are counted, and nothing is
+//! factorised, to tell what cubes of a size would take.
 
 use super::{corners, inclusion::Materials, lattice::Lattice, level::Level, solid::Elements, spacing::Spacing};
 use crate::{memory, scene::ElasticSpec};
 use glam::DVec3;
 
-/// Factor of a solid over n^(4/3) (B): 650 to 900 up to 16,000 nodes. At 31,000 it is 1,130, for which the other half of
-/// the memory has room.
+/// Factor of a solid over n^(4/3) (B): 650 to 900 up to 16,000 nodes. At 31,000 it is 1,130, for which the other half
+/// of the memory has room.
 const FACTOR: f64 = 800.0;
 
 /// By how much more it is where a skin with a bending stiffness couples cubes around each node of the surface (1): 4.6
