@@ -1,6 +1,6 @@
 //! What one frame of the object in motion costs at 10,000 and 100,000 nodes, which the CPU moves: isotropic springs, which
-//! are solved coordinate by coordinate, beside axial ones, which need the whole matrix; and the time and memory of what
-//! is made once.
+//! are solved coordinate by coordinate, beside axial ones, which need the whole matrix, and of elastic solids; and the time
+//! and memory of what is made once.
 //! Before that, what substitution with the factor takes of it (`src/object/substitution.rs`), beside faer's own solve.
 //!
 //!     cargo bench --bench frame
@@ -21,8 +21,8 @@ use haptize::{
     object::Object,
     render::object_motion::ObjectMotion,
     scene::{
-        GraphicsEffects, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape, SpringKind, SpringSpec,
-        StiffeningSpec,
+        ElasticSpec, GraphicsEffects, GroundNodes, GroundSpec, GroundStiffness, Material, ObjectSpec, Shape,
+        SpringKind, SpringSpec, StiffeningSpec,
     },
 };
 use std::time::Instant;
@@ -32,6 +32,23 @@ const FRAMES: usize = 40;
 
 /// Rings and segments of the spheres: 10,002 and 99,858 nodes.
 const RINGS: [usize; 2] = [100, 316];
+
+/// Parts of each edge of the icosahedra whose balls are filled: surfaces of 1,002, 2,562 and 6,252 nodes.
+const SOLIDS: [usize; 3] = [10, 16, 25];
+
+/// A ball of gel on springs over all of its surface, of cubes that it gets by itself.
+fn solid(divisions: usize) -> Object {
+    let elastic = ElasticSpec { young: 1e4, poisson: 0.45, cell: None, inclusions: Vec::new() };
+    Object::build(&ObjectSpec {
+        shape: Shape::Icosphere { centre: DVec3::ZERO, radius: 0.05, divisions },
+        material: Material::Elastic(elastic),
+        skin: None,
+        ground: Some(GroundSpec { stiffness: GroundStiffness::PerArea(1e6), nodes: GroundNodes::All }),
+        node_mass: 1e-3,
+        node_damping: 0.02,
+    })
+    .unwrap()
+}
 
 fn sphere(kind: SpringKind, rings: usize) -> Object {
     Object::build(&ObjectSpec {
@@ -132,38 +149,37 @@ fn main() {
         ("quasi-static", GraphicsEffects { quasi_static: true, ..Default::default() }),
     ];
     println!(
-        "  nodes  springs    effects       built [s]  set up [s]  factor [MB]  frame: least, median, 95 % [ms]  over \
-         isotropic"
+        "body              nodes of K  effects       built [s]  set up [s]  factor [MB]  frame: least, median, 95 % [ms]"
     );
-    for rings in RINGS {
-        let mut isotropic = [0.0; 3];
-        for kind in [SpringKind::Isotropic, SpringKind::Axial] {
-            let (built, object) = timed(|| sphere(kind, rings));
-            let nodes = object.rest.len();
-            let forces: Vec<DVec3> = (0..nodes).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
-            for (number, (name, effects)) in effects.iter().enumerate() {
-                let (set_up, motion) = timed(|| ObjectMotion::new(&object, 1.0 / 60.0, effects));
-                let mut motion = motion.unwrap();
-                let mut costs: Vec<f64> = (0..FRAMES)
-                    .map(|_| {
-                        let (cost, ()) = timed(|| {
-                            motion.step(&forces);
-                        });
-                        1e3 * cost
-                    })
-                    .collect();
-                costs.sort_by(f64::total_cmp);
-                let (frame, median, late) = (costs[0], costs[FRAMES / 2], costs[FRAMES * 95 / 100]);
-                if kind == SpringKind::Isotropic {
-                    isotropic[number] = frame;
-                }
-                let (kind, megabytes) = (format!("{kind:?}"), object.mechanics().unwrap().factor.bytes() as f64 * 1e-6);
-                let ratio = frame / isotropic[number];
-                println!(
-                    "{nodes:7}  {kind:9}  {name:12}  {built:9.2}  {set_up:10.2}  {megabytes:11.1}  {frame:12.2}, \
-                     {median:6.1}, {late:7.1}  {ratio:14.1}"
-                );
-            }
+    let springs = RINGS.into_iter().flat_map(|rings| {
+        [SpringKind::Isotropic, SpringKind::Axial]
+            .map(|kind| (format!("{kind:?} springs"), timed(|| sphere(kind, rings))))
+    });
+    let solids = SOLIDS.into_iter().map(|divisions| ("elastic solid".to_owned(), timed(|| solid(divisions))));
+    for (name, (built, object)) in springs.chain(solids) {
+        let mechanics = object.mechanics().unwrap();
+        let forces: Vec<DVec3> =
+            (0..object.rest.len()).map(|k| DVec3::new(1e-4, 0.0, -1e-3 * (k % 7) as f64)).collect();
+        let is_solid = !mechanics.attachment.is_identity();
+        for (effect, effects) in effects.iter().filter(|(_, effects)| !is_solid || effects.stiffening.is_none()) {
+            let (set_up, motion) = timed(|| ObjectMotion::new(&object, 1.0 / 60.0, effects));
+            let mut motion = motion.unwrap();
+            let step = |_| {
+                let (cost, _) = timed(|| {
+                    motion.step(&forces);
+                    // What is drawn.
+                    motion.nodes().map(|node| node.z).sum::<f64>()
+                });
+                1e3 * cost
+            };
+            let mut costs: Vec<f64> = (0..FRAMES).map(step).collect();
+            costs.sort_by(f64::total_cmp);
+            let (frame, median, late) = (costs[0], costs[FRAMES / 2], costs[FRAMES * 95 / 100]);
+            let (nodes, megabytes) = (mechanics.moved.len(), mechanics.factor.bytes() as f64 * 1e-6);
+            println!(
+                "{name:17} {nodes:10}  {effect:12}  {built:9.2}  {set_up:10.2}  {megabytes:11.1}  {frame:12.2}, {median:6.1}, \
+                 {late:7.1}"
+            );
         }
     }
 }

@@ -104,6 +104,7 @@ impl Describe for Baked {
         if let Some(skin) = sweep.skin {
             text.row("skin", skin);
         }
+        sweep.lattice.iter().for_each(|error| text.row("lattice", error));
         sweep.mesh_ripple.describe(text);
         sweep.lowered.describe(text);
         describe_error(text, sweep.error.as_ref(), *aim);

@@ -176,7 +176,7 @@ impl Twin {
                 1e3 * deepest
             ));
         }
-        if let Some(lattice) = self.lattice.filter(LatticeError::is_large) {
+        if let Some(lattice) = self.lattice.filter(LatticeError::is_coarse) {
             doubts.push(format!(
                 "the lattice is coarse: cubes of {:.2} mm make its compliance err by an estimated {:.1} %, which the modulus makes \
                  up for on the whole, and not place by place: find it again with smaller cubes, --cell {:.4}",

@@ -70,8 +70,20 @@ impl NodeTree {
     /// zero elsewhere (m): [`Proximity::gap`](super::Proximity::gap) is the same below zero, with every node looked at.
     #[must_use]
     pub fn touching_gap(&self, model: &Model<'_>, q: &[f64]) -> f64 {
+        self.gap_below(model, q, 0.0)
+    }
+
+    /// Whether the arm of `model` at the joint coordinates `q` is apart from the object, rounded or not.
+    #[must_use]
+    pub fn is_apart(&self, model: &Model<'_>, q: &[f64]) -> bool {
+        let limit = model.rounded.as_ref().map_or(0.0, |rounded| rounded.blur());
+        self.gap_below(model, q, limit) >= limit
+    }
+
+    /// The gap to the surface where it is less than `limit` (m), which it is else.
+    fn gap_below(&self, model: &Model<'_>, q: &[f64], limit: f64) -> f64 {
         let Model { chain, surface, .. } = model;
-        let (links, mut least, mut place) = (chain.links(q), 0.0_f64, 0);
+        let (links, mut least, mut place) = (chain.links(q), limit, 0);
         while let Some((link, sphere)) = self.spheres.get(place) {
             let (origin, rotation) = (links.origins[*link] - surface.centre, links.rotations[*link]);
             let (bound, _) = surface.distance_bound(origin + rotation * sphere.centre);
@@ -103,7 +115,7 @@ mod tests {
         contact::Proximity,
         fixtures::bodies::{PAPER, contact, sphere},
         random::Random,
-        scene::{ContactSurface, JointKind, JointSpec, ProxyNodeSpec, ProxySpec},
+        scene::{ContactLaw, ContactSpec, ContactSurface, JointKind, JointSpec, ProxyNodeSpec, ProxySpec},
     };
     use glam::DMat3;
 
@@ -137,16 +149,27 @@ mod tests {
     #[test]
     fn the_tree_finds_the_gap_that_a_look_at_every_node_finds() {
         let (object, chain) = (sphere(PAPER).unwrap(), arm());
-        for surface in [ContactSurface::Facets, ContactSurface::Smooth] {
-            let model = Model::new(&object, &chain, crate::scene::ContactSpec { surface, ..contact(500.0) });
+        let rest = ContactSpec { law: ContactLaw::Rest, ..contact(500.0) };
+        for (surface, round) in
+            [(ContactSurface::Facets, None), (ContactSurface::Smooth, None), (ContactSurface::Facets, Some(0.01))]
+        {
+            let model = Model::new(&object, &chain, ContactSpec { surface, round, ..rest });
+            assert_eq!(model.rounded.is_some(), round.is_some());
             let (tree, mut proximity, mut random) = (NodeTree::new(&chain), Proximity::new(&model), Random::new(1));
-            let (mut touching, mut apart) = (0, 0);
+            let (mut touching, mut apart, mut seen) = (0, 0, 0);
             for _ in 0..2000 {
                 let q = [random.between(-3.0, 3.0), random.between(-0.2, 0.2), random.between(-3.0, 3.0)];
                 let (found, gap) = (tree.touching_gap(&model, &q), proximity.gap(&q));
                 *(if gap < 0.0 { &mut touching } else { &mut apart }) += 1;
-                assert!((found - gap.min(0.0)).abs() < 1e-15, "{q:?}: {found} {gap}");
+                seen += usize::from(tree.is_apart(&model, &q));
+                if round.is_some() {
+                    assert!(gap >= 0.0 || !tree.is_apart(&model, &q), "{q:?}: {gap}");
+                } else {
+                    assert!((found - gap.min(0.0)).abs() < 1e-15, "{q:?}: {found} {gap}");
+                    assert_eq!(tree.is_apart(&model, &q), gap >= 0.0, "{q:?}: {gap}");
+                }
             }
+            assert!(10 * seen > 9 * apart, "{seen} of {apart}");
             assert!(touching > 100 && apart > 100, "{touching} touch, {apart} do not");
         }
     }

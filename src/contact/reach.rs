@@ -6,12 +6,12 @@
 //! proxy whose deepest node is d below it moves by about d, hardly by more than [`EXPECTED_MOTION`] d. Results that
 //! need more are found and flagged.
 
-use super::Proximity;
 use super::detection::Detection;
 use super::geometry::RestSurface;
 use super::law::rounded::Rounded;
 use super::model::{Model, greatest_radius};
 use super::thin_parts;
+use super::{NodeTree, Proximity};
 use crate::object::{Compliance, Object};
 use crate::proxy::Chain;
 use crate::scene::{ContactLaw, ContactSpec};
@@ -85,13 +85,15 @@ impl<'a> Model<'a> {
 /// What of `model` the proxy reaches in `configurations`: points of a rounded surface, or leaves of the surface's tree.
 fn reached(model: &Model<'_>, configurations: &[JointVector]) -> Vec<bool> {
     let count = model.rounded.as_ref().map_or(model.surface.bounds.leaves.len(), |rounded| rounded.count());
+    let tree = NodeTree::new(model.chain);
     configurations
         .par_chunks(SHARE)
         .map_init(
             || Proximity::new(model),
             |proximity, share| {
                 let mut marked = vec![false; count];
-                share.iter().for_each(|q| mark(model, proximity, q, &mut marked));
+                let near = share.iter().filter(|q| !tree.is_apart(model, q));
+                near.for_each(|q| mark(model, proximity, q, &mut marked));
                 marked
             },
         )

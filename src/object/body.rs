@@ -30,31 +30,20 @@ impl Body {
 
     /// Refuses node numbers that are out of range. Those of the triangles are checked with the surface.
     pub(super) fn check(&self) -> Result<(), Error> {
-        let count = self.nodes.len();
-        let wild = |corners: &&[u32; 4]| corners.iter().any(|&corner| corner as usize >= count);
-        let is_wild = self.mid_nodes.as_flattened().iter().any(|&node| node as usize >= count);
-        if is_wild || !self.mid_nodes.is_empty() && self.mid_nodes.len() != self.tetrahedra.len() {
-            return Err(error!(
-                "the nodes in the middles of edges do not fit {} tetrahedra and {count} nodes: build the object again \
-                 from its scene",
-                self.tetrahedra.len()
-            ));
-        }
-        if !self.regions.is_empty() && self.regions.len() != self.tetrahedra.len() {
-            let (regions, tetrahedra) = (self.regions.len(), self.tetrahedra.len());
-            return Err(error!(
-                "there are {regions} regions for {tetrahedra} tetrahedra: build the object again from its scene"
-            ));
-        }
-        match self.tetrahedra.iter().find(wild) {
-            Some(corners) => Err(error!(
-                "a tetrahedron has the nodes {corners:?}, of {count}: build the object again from its scene"
-            )),
-            None if self.surface_nodes > count => Err(error!(
-                "{} of {count} nodes are on the surface: build the object again from its scene",
-                self.surface_nodes
-            )),
-            None => Ok(()),
-        }
+        let [count, tetrahedra] = [self.nodes.len(), self.tetrahedra.len()];
+        let is_wild = |nodes: &[u32]| nodes.iter().any(|&node| node as usize >= count);
+        let fits = |numbers: usize| numbers == 0 || numbers == tetrahedra;
+        let defect = if is_wild(self.mid_nodes.as_flattened()) || !fits(self.mid_nodes.len()) {
+            format!("the nodes in the middles of edges do not fit {tetrahedra} tetrahedra and {count} nodes")
+        } else if !fits(self.regions.len()) {
+            format!("there are {} regions for {tetrahedra} tetrahedra", self.regions.len())
+        } else if let Some(corners) = self.tetrahedra.iter().find(|corners| is_wild(*corners)) {
+            format!("a tetrahedron has the nodes {corners:?}, of {count}")
+        } else if self.surface_nodes > count {
+            format!("{} of {count} nodes are on the surface", self.surface_nodes)
+        } else {
+            return Ok(());
+        };
+        Err(error!("{defect}: build the object again from its scene"))
     }
 }

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::scene::Placement;
 use crate::toml_text::{coarse, entry, number, quoted, significant, vector};
 use glam::DVec3;
-use std::fmt::{self, Write};
+use std::fmt::Write;
 use std::path::Path;
 
 /// Density of a body: water's (kg/m^3).
@@ -96,67 +96,42 @@ impl Draft {
         let scale = unit.metres();
         let nodes = Placement { scale, turn, centre: DVec3::ZERO }.place(nodes);
         let [low, high] = import::corners(&nodes);
+        let (middle, height) = (0.5 * (low + high), high.z - low.z);
         let volume = enclosed(&nodes, &triangles);
         let mass = DENSITY * volume / nodes.len().max(1) as f64;
         let width = width.unwrap_or_else(|| SKIN_WIDTH * topology::mean_edge(&nodes, &triangles));
-        let facts = BodyFacts {
-            name,
-            scale,
-            turn,
-            young,
-            middle: 0.5 * (low + high),
-            height: high.z - low.z,
-            volume,
-            mass,
-            width,
-            held,
-        };
-        let mut tables = String::new();
-        // Writing to a string fails only where memory does.
-        let _ = facts.write(&mut tables);
-        Ok(Self { tables, unit })
-    }
-}
-
-/// What is known of a body.
-struct BodyFacts<'a> {
-    name: &'a str,
-    scale: f64,
-    turn: DVec3,
-    young: f64,
-    /// Of the box around it, its height (m), and its volume (m^3).
-    middle: DVec3,
-    height: f64,
-    volume: f64,
-    /// Of a node (kg).
-    mass: f64,
-    /// Of the skin (m).
-    width: f64,
-    /// Part of the height that is held (1).
-    held: f64,
-}
-
-impl BodyFacts<'_> {
-    fn write(&self, text: &mut String) -> fmt::Result {
-        writeln!(text, "[object]")?;
-        let meaning = format!("kg, of each node: the body has {} l, as heavy as water", coarse(1e3 * self.volume));
-        entry(text, "node_mass", &coarse(self.mass), &meaning)?;
-        entry(text, "node_damping", &coarse(DAMPING * self.mass), "N s/m, against the ground")?;
-        writeln!(text, "\n[object.mesh]")?;
-        entry(text, "file", &quoted(self.name), "relative to this file")?;
-        entry(text, "scale", &number(self.scale, 4), "to metres")?;
-        if self.turn != DVec3::ZERO {
-            entry(text, "turn", &vector(self.turn, 6), "rad, about x, then y, then z")?;
+        let water = format!("kg, of each node: the body has {} l, as heavy as water", coarse(1e3 * volume));
+        let mut mesh = vec![
+            ("file", quoted(name), "relative to this file"),
+            ("scale", number(scale, 4), "to metres"),
+            ("centre", vector(-middle, 6), "m, where the file's origin lies"),
+        ];
+        if turn != DVec3::ZERO {
+            mesh.insert(2, ("turn", vector(turn, 6), "rad, about x, then y, then z"));
         }
-        entry(text, "centre", &vector(-self.middle, 6), "m, where the file's origin lies")?;
-        writeln!(text, "\n[object.elasticity]")?;
-        entry(text, "young", &significant(self.young), "Pa")?;
-        entry(text, "poisson", &number(POISSON, 3), "")?;
-        writeln!(text, "\n[object.skin]")?;
-        let meaning = "m, over which the dent of a point is rounded";
-        entry(text, "width", &number(self.width, 5), meaning)?;
-        writeln!(text, "\n[object.ground]")?;
-        entry(text, "clamp", "true", "the body lies on something")?;
-        entry(text, "below", &number((self.held - 0.5) * self.height, 5), "m, height up to which it is held")
+        let mut tables = String::new();
+        let mut table = |heading: &str, entries: &[(&str, String, &str)]| {
+            // Writing to a string fails only where memory does.
+            let _ = writeln!(tables, "{heading}");
+            entries.iter().for_each(|(key, value, meaning)| _ = entry(&mut tables, key, value, meaning));
+        };
+        table(
+            "[object]",
+            &[
+                ("node_mass", coarse(mass), &water),
+                ("node_damping", coarse(DAMPING * mass), "N s/m, against the ground"),
+            ],
+        );
+        table("\n[object.mesh]", &mesh);
+        table("\n[object.elasticity]", &[("young", significant(young), "Pa"), ("poisson", number(POISSON, 3), "")]);
+        table("\n[object.skin]", &[("width", number(width, 5), "m, over which the dent of a point is rounded")]);
+        table(
+            "\n[object.ground]",
+            &[
+                ("clamp", "true".into(), "the body lies on something"),
+                ("below", number((held - 0.5) * height, 5), "m, height up to which it is held"),
+            ],
+        );
+        Ok(Self { tables, unit })
     }
 }

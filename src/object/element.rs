@@ -106,6 +106,11 @@ impl Quadrature {
         self.modes.push(modes);
     }
 
+    /// Place (m) and weight (m^3) of each point.
+    pub fn points(&self) -> impl Iterator<Item = (DVec3, f64)> {
+        self.places.iter().copied().zip(self.weights.iter().copied())
+    }
+
     /// Leaves out the points at places that `is_kept` refuses (m): of no weight.
     pub fn keep(&mut self, is_kept: impl Fn(DVec3) -> bool) {
         let points = self.weights.iter_mut().zip(&self.places);

@@ -10,28 +10,10 @@ use crate::Error;
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// The icosahedron's faces, outward.
-const FACES: [[u32; 3]; 20] = [
-    [0, 11, 5],
-    [0, 5, 1],
-    [0, 1, 7],
-    [0, 7, 10],
-    [0, 10, 11],
-    [1, 5, 9],
-    [5, 11, 4],
-    [11, 10, 2],
-    [10, 7, 6],
-    [7, 1, 8],
-    [3, 9, 4],
-    [3, 4, 2],
-    [3, 2, 6],
-    [3, 6, 8],
-    [3, 8, 9],
-    [4, 9, 5],
-    [2, 4, 11],
-    [6, 2, 10],
-    [8, 6, 7],
-    [9, 8, 1],
+/// The icosahedron's faces, outward: three corners of each.
+const FACES: [u32; 60] = [
+    0, 11, 5, 0, 5, 1, 0, 1, 7, 0, 7, 10, 0, 10, 11, 1, 5, 9, 5, 11, 4, 11, 10, 2, 10, 7, 6, 7, 1, 8, 3, 9, 4, 3, 4, 2,
+    3, 2, 6, 3, 6, 8, 3, 8, 9, 4, 9, 5, 2, 4, 11, 6, 2, 10, 8, 6, 7, 9, 8, 1,
 ];
 
 /// Returns the nodes and outward triangles of a sphere. `divisions`: parts of each edge of the icosahedron.
@@ -62,8 +44,8 @@ pub(crate) fn generate(centre: DVec3, radius: f64, divisions: usize) -> Result<(
             nodes.len() as u32 - 1
         })
     };
-    let mut triangles = Vec::with_capacity(FACES.len() * (divisions * divisions) as usize);
-    for face in FACES {
+    let mut triangles = Vec::with_capacity(20 * (divisions * divisions) as usize);
+    for &face in FACES.as_chunks().0 {
         for i in 0..divisions {
             for j in 0..divisions - i {
                 let mut at = |i: u32, j: u32| number(face, [divisions - i - j, i, j]);

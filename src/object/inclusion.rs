@@ -17,9 +17,6 @@ use crate::{
 use glam::DVec3;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Places along an edge of a part at which its mean is taken.
-const SAMPLES: usize = 6;
-
 /// Largest cubes that a sphere within the body may cut, in its radii (1).
 const LARGEST_CUT: f64 = 0.5;
 
@@ -94,26 +91,17 @@ impl<'a> Materials<'a> {
         sizes.filter(|(inclusion, _)| cuts(inclusion)).map(|(_, size)| *size).reduce(f64::min)
     }
 
-    /// The harmonic mean in the box between two corners (m) if a sphere in it is stiffer than the body.
-    pub fn stiff_mean(&self, [low, high]: [DVec3; 2]) -> Option<Lame> {
-        let along = |k: usize| (k as f64 + 0.5) / SAMPLES as f64;
-        let places = (0..SAMPLES.pow(3)).map(|k| {
-            let at = DVec3::new(along(k / SAMPLES / SAMPLES), along(k / SAMPLES % SAMPLES), along(k % SAMPLES));
-            low + at * (high - low)
-        });
-        self.stiff_mean_of(places, None)
-    }
-
-    /// The same over `places` (m).
-    pub fn stiff_mean_of(&self, places: impl Iterator<Item = DVec3>, region: Option<u32>) -> Option<Lame> {
-        let (mut count, mut stiff, mut compliance) = (0.0, false, [0.0; 2]);
-        for number in places.map(|place| self.number(place, region)) {
-            let lame = self.lame[number];
+    /// The harmonic mean over `points` (m), each of a weight, if a sphere in which some of them lie is stiffer than the
+    /// body.
+    pub fn stiff_mean(&self, points: impl Iterator<Item = (DVec3, f64)>, region: Option<u32>) -> Option<Lame> {
+        let (mut sum, mut stiff, mut compliance) = (0.0, false, [0.0; 2]);
+        for (place, weight) in points {
+            let lame = self.lame[self.number(place, region)];
             stiff |= lame.mu > self.lame[0].mu;
-            compliance = [compliance[0] + 1.0 / lame.mu, compliance[1] + 1.0 / lame.bulk()];
-            count += 1.0;
+            compliance = [compliance[0] + weight / lame.mu, compliance[1] + weight / lame.bulk()];
+            sum += weight;
         }
-        let [mu, bulk] = compliance.map(|sum| count / sum);
+        let [mu, bulk] = compliance.map(|compliance| sum / compliance);
         stiff.then_some(Lame { lambda: bulk - 2.0 / 3.0 * mu, mu })
     }
 

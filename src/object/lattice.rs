@@ -9,7 +9,7 @@
 //!
 //! Walls thinner than half a cube have lines in them, but bend as polynomials of a whole cube do.
 
-use super::attachment::SurfacePoint;
+use super::attachment::{SurfacePoint, surface_points};
 use super::element::{self, CUBE_NODES, GAUSS, Lame, Quadrature};
 use super::inclusion::Materials;
 use super::level::{Filling, LINES, Level, across, line};
@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 const OUTSIDE: f64 = 1e-4;
 
 /// Distance of the points at which the surface is taken to follow the solid, at most, in cubes (1).
-pub(super) const POINT_SPACING: f64 = 0.5;
+const POINT_SPACING: f64 = 0.5;
 
 /// Number of no cube or node.
 const ABSENT: u32 = u32::MAX;
@@ -50,15 +50,19 @@ struct Cube {
 }
 
 impl Lattice {
-    /// Fills the closed surface with cubes of `level` and larger ones, and smaller ones where a sphere of `materials` cuts
-    /// them. `points`: on all of the surface, so that each has a cube.
+    /// Fills the closed surface of `triangles` with cubes of `size` (m) and larger ones, and smaller ones where a sphere of
+    /// `materials` cuts them. Returns points on all of the surface, too, each of which has a cube.
+    ///
+    /// # Errors
+    /// When there are too many cubes.
     pub fn fill(
-        level: Level,
+        size: f64,
         (nodes, triangles): (&[DVec3], &[[u32; 3]]),
-        points: &[SurfacePoint],
-        spacing: &Spacing,
         materials: &Materials<'_>,
-    ) -> Self {
+    ) -> Result<(Self, Vec<SurfacePoint>), Error> {
+        let level = Level::around(nodes, size)?;
+        let spacing = Spacing::new(nodes, triangles);
+        let points = surface_points(nodes, triangles, POINT_SPACING * size);
         let halvings = level.halvings(materials.largest_cut());
         let finest = level.finer(halvings);
         let coarsest = finest.counts.min_element().ilog2();
@@ -70,7 +74,7 @@ impl Lattice {
         for (number, level) in lattice.levels.clone().into_iter().enumerate().rev() {
             let mut facing = vec![DVec3::ZERO; level.counts.element_product() as usize];
             let mut is_fine = vec![false; facing.len()];
-            for point in points {
+            for point in &points {
                 let cube = level.number(finest.place(point) >> number as u32);
                 facing[cube] += point.area * point.normal.abs();
                 is_fine[cube] |= spacing.level(point.owner) + halvings < number;
@@ -91,7 +95,7 @@ impl Lattice {
             }
         }
         lattice.number_nodes();
-        lattice
+        Ok((lattice, points))
     }
 
     /// Finds the nodes of all cubes, and what those that hang are carried by.
@@ -234,18 +238,16 @@ impl Elements for Lattice {
         let mut lame = Vec::new();
         let factor = if cube.filling.inside.is_some() { 1.0 - OUTSIDE } else { 1.0 };
         if materials.cut([low, low + size]).is_some() {
-            // Points and materials in each eighth.
-            let eighth = |k: usize| low + 0.5 * size * DVec3::from_array([k / 4, k / 2 % 2, k % 2].map(|i| i as f64));
-            let means: Vec<Option<Lame>> =
-                (0..8).map(|k| materials.stiff_mean([eighth(k), eighth(k) + 0.5 * size])).collect();
             for range in [[0.0, 0.5], [0.5, 1.0]] {
                 self.push_stretches(&mut quadrature, cube, range, factor);
             }
             let middle = low + 0.5 * size;
+            let eighth = |place: DVec3| place.cmpge(middle).bitmask() as usize;
+            let means = [0, 1, 2, 3, 4, 5, 6, 7]
+                .map(|k| materials.stiff_mean(quadrature.points().filter(|(place, _)| eighth(*place) == k), None));
             lame.extend(quadrature.places.iter().map(|place| {
-                let [x, y, z]: [bool; 3] = place.cmpge(middle).into();
                 let own = materials.at(*place, None);
-                means[usize::from(x) * 4 + usize::from(y) * 2 + usize::from(z)].unwrap_or(own)
+                means[eighth(*place)].unwrap_or(own)
             }));
         } else {
             match &cube.filling.inside {

@@ -6,7 +6,7 @@
 //! have in energy under a pressure whose edge their nodes do not follow. Coarser cubes take a tenth of the work of
 //! those in question; finer ones would take some thirty times as much.
 
-use super::{Compliance, Mechanics, Object, spacing::Spacing, topology};
+use super::{Compliance, Object, topology};
 use crate::scene::{ElasticSpec, Material, ObjectSpec};
 use crate::{Error, cache::Cache};
 use glam::DVec3;
@@ -27,19 +27,22 @@ const RADIUS: f64 = 3.0;
 const LARGE: f64 = 0.05;
 
 /// By how much compliance errs because of the size of the cubes.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LatticeError {
     /// Size of the cubes (m).
     pub cell: f64,
     /// Estimated error of the displacement under a small contact, relative to it (1).
     pub relative: f64,
+    /// Size of cubes that would suit the surface, where they would take more memory or time than they may (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub suitable: Option<f64>,
 }
 
 impl LatticeError {
-    /// Whether it is large enough to be warned of.
+    /// Whether it is large enough to be warned of, or cubes are larger than suits the surface.
     #[must_use]
-    pub fn is_large(&self) -> bool {
-        self.relative > LARGE
+    pub fn is_coarse(&self) -> bool {
+        self.relative > LARGE || self.suitable.is_some()
     }
 }
 
@@ -51,10 +54,16 @@ impl fmt::Display for LatticeError {
             self.cell * 1e3,
             self.relative * 1e2
         )?;
-        if self.is_large() {
-            write!(f, ": set object.elasticity.cell = {:.4}", self.cell / 2.0)?;
+        match self.suitable {
+            Some(suitable) => write!(
+                f,
+                "; those of {:.2} mm, which suit the surface, would take too much memory or time: give it longer edges \
+                 where nothing touches it, or set object.elasticity.cell = {suitable:.4}",
+                suitable * 1e3
+            ),
+            None if self.is_coarse() => write!(f, ": set object.elasticity.cell = {:.4}", self.cell / 2.0),
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 
@@ -65,12 +74,12 @@ impl Object {
     #[must_use]
     pub fn lattice_error(&self, compliance: &Compliance) -> Option<LatticeError> {
         let Material::Elastic(elastic) = &self.spec.material else { return None };
+        let cell = elastic.cell?;
         let trace = |i: usize| (0..3).map(|k| compliance.block(i, i).col(k)[k]).sum::<f64>();
         let mut places: Vec<usize> = (0..compliance.nodes.len()).collect();
         places.sort_by(|&i, &j| trace(i).total_cmp(&trace(j)));
-        let typical = *places.get(places.len() / 2).filter(|_| self.tetrahedra.is_empty())?;
+        let typical = *places.get(places.len() / 2)?;
         let edge = topology::mean_edge(&self.rest, &self.triangles);
-        let cell = elastic.cell.unwrap_or_else(|| Spacing::new(&self.rest, &self.triangles).suitable_size(&self.rest));
         let node = compliance.nodes[typical];
         let key = [&self.key[..], b"error of the lattice", &node.to_le_bytes()].concat();
         let kept = Cache::used().and_then(|cache| cache.find(&key));
@@ -81,7 +90,7 @@ impl Object {
             Cache::used().into_iter().for_each(|cache| cache.keep(&key, &relative.to_le_bytes()));
             Some(relative)
         })?;
-        Some(LatticeError { cell, relative })
+        Some(LatticeError { cell, relative, suitable: self.suitable_cell })
     }
 
     /// The same from the work of `forces` on cubes of the size `coarser` (m), relative to the compliance (1).
@@ -109,10 +118,7 @@ impl Object {
 
     /// Work of `forces` on the surface's nodes along the displacement that they cause.
     fn work(&self, forces: &[DVec3]) -> Result<f64, Error> {
-        let Mechanics { attachment, factor, moved, .. } = self.mechanics()?;
-        let mut u = vec![DVec3::ZERO; moved.len()];
-        attachment.spread(forces, &mut u);
-        factor.solve(&mut u);
-        Ok(forces.iter().enumerate().map(|(node, force)| force.dot(attachment.follow(node, &u))).sum())
+        let displacement = self.mechanics()?.displacement_under(forces);
+        Ok(forces.iter().zip(displacement).map(|(force, u)| force.dot(u)).sum())
     }
 }

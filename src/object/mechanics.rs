@@ -5,12 +5,10 @@ use super::{
     factor::prove_positive_definite,
     ground::{self, Held},
     inclusion::Materials,
-    lattice::{self, Lattice},
-    level::Level,
+    lattice::Lattice,
     ordering,
     skin::Laplacian,
     solid::{self, Elements},
-    spacing::Spacing,
     springs,
     tetrahedra::Tetrahedra,
     topology::mean_edge,
@@ -57,12 +55,10 @@ impl Mechanics {
         };
         let elements: Option<Box<dyn Elements>> = match &elastic {
             Some((elastic, materials)) if object.tetrahedra.is_empty() => {
-                let spacing = Spacing::new(shell, &object.triangles);
-                let cell = elastic.cell.unwrap_or_else(|| spacing.suitable_size(shell));
-                let level = Level::around(shell, cell)?;
-                points = attachment::surface_points(shell, &object.triangles, lattice::POINT_SPACING * cell);
-                let surface = (shell, &object.triangles[..]);
-                Some(Box::new(Lattice::fill(level, surface, &points, &spacing, materials)))
+                let cell = elastic.cell.unwrap_or_default();
+                let (lattice, on_surface) = Lattice::fill(cell, (shell, &object.triangles), materials)?;
+                points = on_surface;
+                Some(Box::new(lattice))
             }
             Some(_) => Some(Box::new(Tetrahedra::new(object))),
             None => None,

@@ -7,6 +7,7 @@
 
 mod attachment;
 mod body;
+mod cell;
 mod compliance;
 mod condensation;
 mod crossing;
@@ -56,7 +57,9 @@ use crate::{
     Error,
     cache::Cache,
     error, memory,
-    scene::{ElasticSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape},
+    scene::{
+        ElasticSpec, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec, Shape, SkinSpec,
+    },
 };
 use glam::DVec3;
 use std::sync::{Arc, OnceLock};
@@ -85,8 +88,10 @@ pub struct Object {
     pub skin: Option<Skin>,
     /// Repairs made on the way, one sentence each, for the user to read.
     pub warnings: Vec<String>,
-    /// What it was built of.
+    /// What it was built of, the size of its cubes included.
     spec: ObjectSpec,
+    /// Size of cubes that would suit its surface, where larger ones were taken (m): see [`cell`].
+    suitable_cell: Option<f64>,
     /// See [`Object::key`].
     key: Arc<[u8]>,
     /// Rows of K per node, where an earlier run has found that it is positive definite.
@@ -136,7 +141,7 @@ impl Object {
                 import::read_tetrahedra(file, placement, &wanted, &mut warnings)?
             }
         };
-        Self::assemble(spec, body, warnings)
+        Self::assemble(spec, body, warnings, cell::limit())
     }
 
     /// Builds the object of `spec` on another surface; no file is read.
@@ -160,10 +165,11 @@ impl Object {
             );
         }
         body.check()?;
-        Self::assemble(spec, body, Vec::new())
+        Self::assemble(spec, body, Vec::new(), cell::limit())
     }
 
-    fn assemble(spec: &ObjectSpec, mut body: Body, mut warnings: Vec<String>) -> Result<Self, Error> {
+    /// `limit`: most memory that a lattice may take whose cubes have no size given (B).
+    fn assemble(spec: &ObjectSpec, mut body: Body, mut warnings: Vec<String>, limit: f64) -> Result<Self, Error> {
         check_parameters(spec)?;
         check_count(body.nodes.len())?;
         let surface = topology::close(&body.nodes[..body.surface_nodes], &mut body.triangles)
@@ -175,7 +181,17 @@ impl Object {
             let grounded = spec.ground.as_ref().map(|ground| ground::select(ground, &body.nodes)).transpose()?;
             ground::check_components(&surface.components, grounded.as_deref().unwrap_or_default())?;
         }
-        let key: Arc<[u8]> = key(spec, &body).into();
+        let (mut spec, mut suitable_cell) = (spec.clone(), None);
+        if let Material::Elastic(elastic) = &mut spec.material
+            && elastic.cell.is_none()
+            && body.tetrahedra.is_empty()
+        {
+            let bends = spec.skin.is_some_and(|skin| skin.bending > 0.0);
+            let [suitable, size] = cell::sizes((&body.nodes, &body.triangles), elastic, bends, limit);
+            elastic.cell = Some(size);
+            suitable_cell = (size > suitable).then_some(suitable);
+        }
+        let key: Arc<[u8]> = key(&spec, &body).into();
         let Body { nodes, surface_nodes, triangles, tetrahedra, mid_nodes, regions } = body;
         let object = Self {
             proven: Cache::used().and_then(|cache| cache.find(&key)?.first().map(|rows| usize::from(*rows))),
@@ -188,7 +204,8 @@ impl Object {
             regions,
             topology: surface.topology,
             warnings,
-            spec: spec.clone(),
+            spec,
+            suitable_cell,
             key,
             mechanics: OnceLock::new(),
         };
@@ -253,52 +270,42 @@ const LEAST_BYTES_PER_NODE: usize = 4 * 9 * size_of::<f64>();
 
 /// Numbers that a scene file has had checked already, and a specification made in code has not.
 fn check_parameters(spec: &ObjectSpec) -> Result<(), Error> {
-    let material = match &spec.material {
-        Material::Springs(springs) => Some(("spring stiffness", springs.stiffness)),
-        Material::Elastic(elastic) => Some(("Young's modulus", elastic.young)),
-        Material::Hollow => None,
-    };
-    let ground = spec.ground.as_ref().and_then(|ground| ground.stiffness.value());
-    let ground = ground.map(|value| ("ground stiffness", value));
-    let skin =
-        spec.skin.map(|skin| ("skin's greatest coefficient", skin.tension.max(skin.bending).max(skin.foundation)));
-    for (name, value) in material.into_iter().chain(ground).chain(skin).chain([("node mass", spec.node_mass)]) {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(out_of_range(name, value, "positive and finite"));
+    let positive = |name, value: f64| (name, value, "positive and finite", value > 0.0 && value.is_finite());
+    let at_least_zero =
+        |name, value: f64| (name, value, "zero or positive, and finite", value >= 0.0 && value.is_finite());
+    let ratio = |value: f64| ("Poisson's ratio", value, "above -1 and below 0.5", value > -1.0 && value < 0.5);
+    let mut checks = vec![positive("node mass", spec.node_mass), at_least_zero("node damping", spec.node_damping)];
+    match &spec.material {
+        Material::Springs(springs) => checks.push(positive("spring stiffness", springs.stiffness)),
+        Material::Elastic(ElasticSpec { young, poisson, cell, inclusions }) => {
+            checks.extend([positive("Young's modulus", *young), ratio(*poisson)]);
+            checks.extend(cell.map(|cell| positive("cell", cell)));
+            checks.extend(inclusions.iter().map(|inclusion| ratio(inclusion.poisson)));
+            checks.extend(inclusions.iter().map(|inclusion| positive("inclusion's Young's modulus", inclusion.young)));
+        }
+        Material::Hollow => {}
+    }
+    if let Some(GroundSpec { stiffness, .. }) = &spec.ground {
+        checks.extend(stiffness.value().map(|value| positive("ground stiffness", value)));
+        let needs_solid = matches!(stiffness, GroundStiffness::Clamp | GroundStiffness::PerVolume(_));
+        if needs_solid && !matches!(spec.material, Material::Elastic(_)) {
+            return Err(
+                "a ground per volume, or one that clamps, needs an elastic solid: give a stiffness per node or per \
+                        area"
+                    .into(),
+            );
         }
     }
-    let needs_solid = |stiffness| matches!(stiffness, GroundStiffness::Clamp | GroundStiffness::PerVolume(_));
-    let is_elastic = matches!(spec.material, Material::Elastic(_));
-    if spec.ground.as_ref().is_some_and(|ground| needs_solid(ground.stiffness)) && !is_elastic {
-        return Err(
-            "a ground per volume, or one that clamps, needs an elastic solid: give a stiffness per node or per area"
-                .into(),
-        );
+    if let Some(SkinSpec { tension, bending, foundation }) = spec.skin {
+        checks.push(positive("skin's greatest coefficient", tension.max(bending).max(foundation)));
+        checks.push(at_least_zero("tension of the skin", tension));
+        checks.push(at_least_zero("bending stiffness of the skin", bending));
+        checks.push(at_least_zero("foundation of the skin", foundation));
     }
-    let skin = spec.skin.map_or([0.0; 3], |skin| [skin.tension, skin.bending, skin.foundation]);
-    let names = ["tension of the skin", "bending stiffness of the skin", "foundation of the skin"];
-    let damping = ("node damping", spec.node_damping);
-    for (name, value) in names.into_iter().zip(skin).chain([damping]) {
-        if !(value >= 0.0 && value.is_finite()) {
-            return Err(out_of_range(name, value, "zero or positive, and finite"));
-        }
+    match checks.into_iter().find(|(.., holds)| !holds) {
+        Some((name, value, range, _)) => Err(out_of_range(name, value, range)),
+        None => Ok(()),
     }
-    if let Material::Elastic(ElasticSpec { poisson, cell, inclusions, .. }) = &spec.material {
-        for value in inclusions.iter().map(|inclusion| inclusion.poisson).chain([*poisson]) {
-            if !(value > -1.0 && value < 0.5) {
-                return Err(out_of_range("Poisson's ratio", value, "above -1 and below 0.5"));
-            }
-        }
-        for value in inclusions.iter().map(|inclusion| inclusion.young) {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(out_of_range("inclusion's Young's modulus", value, "positive and finite"));
-            }
-        }
-        if let Some(value) = cell.filter(|cell| !(*cell > 0.0 && cell.is_finite())) {
-            return Err(out_of_range("cell", value, "positive and finite"));
-        }
-    }
-    Ok(())
 }
 
 /// The error of a surface on which contact cannot be computed, because of `defect`.

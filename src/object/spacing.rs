@@ -48,11 +48,9 @@ impl Spacing {
         Self { edges, finest }
     }
 
-    /// Size of cubes that suit the finest part of the surface, no larger than the body's least extent (m).
-    pub fn suitable_size(&self, nodes: &[DVec3]) -> f64 {
-        let low = nodes.iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = nodes.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
-        (EDGES_PER_CUBE * self.finest).min((high - low).min_element())
+    /// Size of cubes that suit the finest part of the surface (m).
+    pub fn suitable_size(&self) -> f64 {
+        EDGES_PER_CUBE * self.finest
     }
 
     /// How often cubes that suit the finest part may be doubled at `node`.

@@ -174,7 +174,7 @@ impl Elements for Tetrahedra {
         }
         let region = self.region(element);
         let own: Vec<Lame> = quadrature.places.iter().map(|place| materials.at(*place, region)).collect();
-        let mean = is_cut.then(|| materials.stiff_mean_of(quadrature.places.iter().copied(), region)).flatten();
+        let mean = is_cut.then(|| materials.stiff_mean(quadrature.points(), region)).flatten();
         let lame = mean.map_or(own, |mean| vec![mean; quadrature.places.len()]);
         Ok((quadrature, lame))
     }

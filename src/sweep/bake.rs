@@ -125,10 +125,9 @@ impl Bake<'_> {
             }
         }
         sweep.binding.provenance.aim = aim;
-        let error = object.lattice_error(&model.compliance);
-        sweep
-            .warnings
-            .extend(error.filter(LatticeError::is_large).map(|error| format!("the lattice is coarse: {error}")));
+        sweep.lattice = object.lattice_error(&model.compliance);
+        let coarse = sweep.lattice.filter(LatticeError::is_coarse);
+        sweep.warnings.extend(coarse.map(|error| format!("the lattice is coarse: {error}")));
         let run = Run { chunk: chosen.chunk(), stop, progress };
         work(&mut sweep, &mut chosen, run)
     }

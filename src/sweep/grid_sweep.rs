@@ -22,7 +22,7 @@ use crate::{
     contact::{MeshRipple, Model},
     dataset::{self, Axis, Dataset, Extras, Grid, Heading, Provenance, Surface},
     error, memory,
-    object::{Object, Skin},
+    object::{LatticeError, Object, Skin},
     scene::{HapticsSpec, Scene},
 };
 use std::{
@@ -71,6 +71,8 @@ pub struct Sweep<'a> {
     pub(super) with_forces: bool,
     /// The object's skin.
     pub(super) skin: Option<Skin>,
+    /// The error of the object's lattice.
+    pub(super) lattice: Option<LatticeError>,
     /// Warnings about the object.
     pub(super) warnings: Vec<String>,
     /// By which free space is found; `None` where all points are solved.
@@ -139,6 +141,7 @@ impl<'a> Sweep<'a> {
             surface: Surface::of(object),
             with_forces,
             skin: object.skin,
+            lattice: None,
             warnings: object.warnings.clone(),
             model: None,
             lowest: None,

@@ -3,12 +3,13 @@
 use super::{Backend, CpuBackend, tile::PointResult};
 use crate::{
     Error, JointVector,
-    contact::{Equilibrium, Model, Slip, Solvers, Status, exact_dissipation},
+    contact::{Equilibrium, Model, NodeTree, Slip, Solvers, Status, exact_dissipation},
     dataset::{FrictionExcess, InterpolationError, MeasuredError},
     error,
     random::Random,
     scene::{ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
 };
+use rayon::prelude::*;
 
 /// Relative residual to which the reference of an accuracy study is solved (1): three decades below the scenes' own
 /// 1e-8, and still above what rounding leaves of a residual (about 1e-13).
@@ -84,8 +85,6 @@ impl Reference {
     }
 
     fn drawn(scene: &Scene, model: &Model<'_>, seed: u64, mut count: usize, contacts: usize) -> Result<Self, Error> {
-        let model = model.with_contact(tight(scene.contact, REFERENCE_TOLERANCE));
-        let mut backend = CpuBackend::new(&model, 0)?;
         let mut random = Random::new(seed);
         let mut reference = Self::of(EffortNorm::of(scene), []);
         let mut place = |_| {
@@ -97,7 +96,7 @@ impl Reference {
         };
         loop {
             let places: Vec<JointVector> = (reference.solved()..count).map(&mut place).collect();
-            let solved = backend.solve(&places).unwrap_or_else(|never| match never {});
+            let solved = without_gaps(model, tight(scene.contact, REFERENCE_TOLERANCE), &places)?;
             reference.extend(places.into_iter().zip(solved));
             if reference.in_contact >= contacts || count >= MOST_DRAWN {
                 break;
@@ -132,7 +131,7 @@ impl Reference {
 
     /// Rms distance of the same configurations solved as `contact` says (N m).
     pub(crate) fn error_of(&self, model: &Model<'_>, contact: ContactSpec) -> Result<f64, Error> {
-        let solved = equilibria(model, contact, &self.places)?;
+        let solved = without_gaps(model, contact, &self.places)?;
         let mut torques = solved.iter().map(|equilibrium| equilibrium.torque);
         Ok(self.errors(|q| torques.next().unwrap_or(*q)).0)
     }
@@ -253,6 +252,16 @@ pub(crate) fn equilibria(
     let model = model.with_contact(contact);
     let mut backend = CpuBackend::new(&model, 0)?;
     Ok(backend.solve(places).unwrap_or_else(|never| match never {}))
+}
+
+/// The same, but free ones have no gap: the arm is seen to be apart there by a few of its nodes.
+fn without_gaps(model: &Model<'_>, contact: ContactSpec, places: &[JointVector]) -> Result<Vec<Equilibrium>, Error> {
+    let tree = NodeTree::new(model.chain);
+    let are_apart: Vec<bool> = places.par_iter().map(|q| tree.is_apart(model, q)).collect();
+    let near = places.iter().zip(&are_apart).filter(|(_, is_apart)| !**is_apart).map(|(q, _)| *q);
+    let mut solved = equilibria(model, contact, &near.collect::<Vec<_>>())?.into_iter();
+    let free = || Equilibrium::free(0.0, model.chain.joints.len());
+    Ok(are_apart.into_iter().filter_map(|is_apart| if is_apart { Some(free()) } else { solved.next() }).collect())
 }
 
 #[cfg(test)]

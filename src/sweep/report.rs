@@ -3,7 +3,7 @@
 use super::{Footprint, Forecast, Lowered, Sweep, tally::Tally};
 use crate::contact::MeshRipple;
 use crate::dataset::{MeasuredError, Provenance};
-use crate::object::Skin;
+use crate::object::{LatticeError, Skin};
 use serde::Serialize;
 use std::time::Duration;
 
@@ -54,6 +54,9 @@ pub struct SweepReport {
     /// The object's skin beside its mesh; absent where it has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub skin: Option<Skin>,
+    /// The error that the cubes of the object's lattice make; absent where it has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lattice: Option<LatticeError>,
     /// How much a contact point feels the mesh; absent where that was not looked at.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh_ripple: Option<MeshRipple>,
@@ -114,6 +117,7 @@ impl SweepReport {
             footprint: run.footprint,
             forecast: sweep.forecast,
             skin: sweep.skin,
+            lattice: sweep.lattice,
             mesh_ripple: provenance.mesh_ripple,
             warnings: sweep.warnings.iter().chain(&provenance.notices).cloned().collect(),
         }

@@ -5,14 +5,16 @@ use super::cells::{HEXAHEDRON, build, written};
 use super::*;
 use haptize::scene::{InclusionPlace, InclusionSpec};
 
-/// Height of a block of 60 x 60 mm, and radius of the ball in it (m).
+/// Height of a block of 60 x 60 mm (m).
 const HEIGHT: f64 = 0.03;
-const BALL: f64 = 0.008;
 
-/// Half side of the box in which the mesh goes over from the ball to the block, and of the cube in the ball's middle
-/// (m).
-const BOX: f64 = 0.012;
-const CORE: f64 = 0.004;
+/// Half side of the box in which the mesh goes over from the ball to the block, and of the cube in the ball's middle, in
+/// radii of the ball (1).
+const BOX: f64 = 1.5;
+const CORE: f64 = 0.5;
+
+/// Pitch of the mesh beside that box, at least (m).
+const PITCH: f64 = 0.004;
 
 const POISSON: f64 = 0.45;
 
@@ -55,13 +57,14 @@ impl Mesh {
     }
 }
 
-/// The block with the ball around `centre`, `cells` of which lie along each side of the box around it; what is above
+/// The block with the ball of `radius` around `centre`, `cells` of which lie along each side of the box around it; what is above
 /// the block's top is cut off.
-fn fitted(cells: usize, centre: DVec3) -> Mesh {
+fn fitted(cells: usize, centre: DVec3, radius: f64) -> Mesh {
+    let [around, core] = [BOX, CORE].map(|part| part * radius);
     let mut mesh = Mesh::default();
     let fraction = |i: usize| 2.0 * i as f64 / (2 * cells) as f64 - 1.0;
     let cube = |at: [usize; 3]| DVec3::from_array(at.map(fraction));
-    mesh.add([cells; 3], INNER, |at| centre + CORE * cube(at));
+    mesh.add([cells; 3], INNER, |at| centre + core * cube(at));
     for (axis, side) in (0..3).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
         let direction = |[u, v, _]: [usize; 3]| {
             let mut direction = DVec3::ZERO;
@@ -72,22 +75,22 @@ fn fitted(cells: usize, centre: DVec3) -> Mesh {
         };
         let layers = cells / 2;
         let part = |at: [usize; 3]| at[2] as f64 / (2 * layers) as f64;
-        let on_ball = |at: [usize; 3]| BALL * direction(at).normalize();
+        let on_ball = |at: [usize; 3]| radius * direction(at).normalize();
         let counts = [cells, cells, layers];
-        mesh.add(counts, INNER, |at| centre + (CORE * direction(at)).lerp(on_ball(at), part(at)));
-        mesh.add(counts, 1, |at| centre + on_ball(at).lerp(BOX * direction(at), part(at)));
+        mesh.add(counts, INNER, |at| centre + (core * direction(at)).lerp(on_ball(at), part(at)));
+        mesh.add(counts, 1, |at| centre + on_ball(at).lerp(around * direction(at), part(at)));
     }
     // The rest: planes along each axis.
     let planes = |low: f64, high: f64, middle: f64| {
-        let pitch = 2.0 * BOX / cells as f64;
+        let pitch = 2.0 * around / cells as f64;
         let beside = |from: f64, to: f64| {
-            let count = ((to - from).abs() / pitch - 1e-9).ceil() as usize;
+            let count = ((to - from).abs() / pitch.max(PITCH) - 1e-9).ceil() as usize;
             (0..count).map(move |k| from + (to - from) * k as f64 / count as f64)
         };
-        let mut planes: Vec<f64> = beside(low, middle - BOX).collect();
-        planes.extend((0..=cells).map(|k| middle - BOX + pitch * k as f64));
-        let above: Vec<f64> = beside(high, middle + BOX).collect();
-        planes.extend(above.into_iter().rev().filter(|plane| *plane > middle + BOX));
+        let mut planes: Vec<f64> = beside(low, middle - around).collect();
+        planes.extend((0..=cells).map(|k| middle - around + pitch * k as f64));
+        let above: Vec<f64> = beside(high, middle + around).collect();
+        planes.extend(above.into_iter().rev().filter(|plane| *plane > middle + around));
         planes
     };
     let along = [planes(-0.03, 0.03, centre.x), planes(-0.03, 0.03, centre.y), planes(0.0, HEIGHT, centre.z)];
@@ -96,7 +99,7 @@ fn fitted(cells: usize, centre: DVec3) -> Mesh {
     for k in 0..x * y * z {
         let cell = [k / (y * z), k / z % y, k % z];
         let place = |at: [usize; 3]| DVec3::from_array([0, 1, 2].map(|axis| half(axis, 2 * cell[axis] + at[axis])));
-        if ((place([1; 3]) - centre).abs() - BOX).max_element() > 0.0 {
+        if ((place([1; 3]) - centre).abs() - around).max_element() > 0.0 {
             mesh.add([1; 3], 1, place);
         }
     }
@@ -109,25 +112,34 @@ fn holding(inclusion: Option<(InclusionPlace, f64)>) -> Material {
     Material::Elastic(ElasticSpec { young: YOUNG, poisson: POISSON, cell: None, inclusions })
 }
 
-/// By how much less the block gives way over the ball, and 8 mm aside: a ball in the middle, aside, and half out of the
-/// top, its cubes of the size that they get by themselves.
+/// By how much less the block gives way over the ball, and beside it: a ball in the middle, aside, half out of the top, and
+/// a small one below the top, its cubes of the size that they get by themselves. Other stiffnesses, where errors are
+/// greatest.
 #[test]
 fn inclusions_count_as_in_meshes_that_fit_them() {
     let cut = |ball| solid(block([24, 24, 12], 0.0025), holding(ball), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO);
     let plain = cut(None);
-    for centre in [DVec3::new(0.0, 0.0, 0.015), DVec3::new(0.007, 0.004, 0.017), DVec3::new(0.0, 0.0, HEIGHT)] {
-        let mesh = fitted(4, centre);
+    let top = HEIGHT * DVec3::Z;
+    for (centre, radius, factors) in [
+        (0.5 * top, 0.008, &[10.0, 0.1][..]),
+        (DVec3::new(0.007, 0.004, 0.017), 0.008, &[10.0, 0.1]),
+        (top, 0.008, &[30.0, 10.0, 3.0, 0.1]),
+        (top - 0.006 * DVec3::Z, 0.004, &[30.0, 0.1]),
+    ] {
+        let mesh = fitted(4, centre, radius);
         let text = written(12, &mesh.places, &mesh.elements);
         let fitted = |ball| build(&text, holding(ball), clamped(1e-6));
         let plain = [&plain, &fitted(None)];
-        for factor in [10.0, 0.1] {
+        for factor in factors {
             let young = factor * YOUNG;
-            let ball = InclusionPlace::Sphere { centre, radius: BALL };
+            let ball = InclusionPlace::Sphere { centre, radius };
             let with = [cut(Some((ball, young))), fitted(Some((InclusionPlace::Region(INNER), young)))];
-            for aside in [0.0, 0.008] {
+            for aside in [0.0, radius] {
                 let gives = |object: &Object| compliance(object, DVec3::new(aside, 0.0, HEIGHT), DVec3::Z);
                 let [found, expected] = [0, 1].map(|k| gives(plain[k]) / gives(&with[k]) - 1.0);
-                println!("{factor} times as stiff at {centre}, {aside} m aside: {found:+.3} of {expected:+.3}");
+                println!(
+                    "ball of {radius} m at {centre}, {factor} times as stiff, {aside} m aside: {found:+.3} of {expected:+.3}"
+                );
                 assert!((found - expected).abs() < 0.02, "{centre}, {factor}: {found} of {expected}");
             }
         }
