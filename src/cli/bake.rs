@@ -7,9 +7,9 @@ use super::{
     output::{self, Content},
     reach,
     refine::{self, RefinementGoal},
+    remarks,
     report::{Describe, Report, Text},
     shard::ShardChoice,
-    tell,
     watch::{configurations, watched},
 };
 use crate::{
@@ -135,6 +135,6 @@ fn run_shard(arguments: &Arguments, scene: &Scene, shard: Shard) -> Result<Repor
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from("."));
     let (file, sweep) = watched(scene, arguments.backend, |bake| bake.to_shard(&folder, shard))?;
     let warnings = sweep.iter().flat_map(|sweep| &sweep.warnings);
-    warnings.for_each(|warning| tell(format_args!("haptize: {warning}")));
+    warnings.for_each(|warning| remarks::once(warning));
     Report::new(&BakedShard { sweep, file: file.display().to_string(), shard })
 }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     ErrorKind, JointVector,
-    contact::{Model, NodeForce},
+    contact::{MeshRipple, Model, NodeForce},
     dataset::Dataset,
     field::TorqueField,
     names::counted,
@@ -93,13 +93,13 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let warnings = outside(&chain, &scene.grid, q);
     warnings.iter().for_each(|warning| tell(format_args!("haptize: note: {warning}")));
     let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(q)])?;
-    object.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
     let dataset = dataset.as_ref();
     let solved = Inspection::new(&model, q);
     let inspected = Inspected {
         interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
         stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
         lattice: object.lattice_error(&model.compliance),
+        mesh_ripple: MeshRipple::new(&model),
         solved,
         warnings,
         body: Body { inclusions: info::inclusions(&scene.object), skin: object.skin },
@@ -121,6 +121,9 @@ struct Inspected {
     /// Where a lattice fills the object: the error that it makes.
     #[serde(skip_serializing_if = "Option::is_none")]
     lattice: Option<LatticeError>,
+    /// How much a contact point feels the mesh, where the compliance covers a facet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mesh_ripple: Option<MeshRipple>,
     /// Where there is a dataset: what it answers here.
     #[serde(skip_serializing_if = "Option::is_none")]
     interpolated: Option<Interpolated>,
@@ -265,6 +268,7 @@ impl Describe for Inspected {
         }
         self.body.describe(text);
         self.lattice.iter().for_each(|error| text.row("lattice", error));
+        self.mesh_ripple.describe(text);
         if let Some(Interpolated { interpolation, torque, difference, .. }) = &self.interpolated {
             text.line(format_args!("the dataset, interpolated here ({}):", interpolation.name()));
             text.row("torque", efforts(torque));

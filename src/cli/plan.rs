@@ -6,6 +6,7 @@ use super::{
     shell, watch,
 };
 use crate::{
+    names::duration,
     scene::Scene,
     sweep::{BackendChoice, Forecast, Plan},
 };
@@ -117,7 +118,7 @@ impl Lines {
 impl Describe for Planned {
     fn describe(&self, text: &mut Text) {
         let Self { scene, plan, seconds, lines } = self;
-        let (count, points, setup) = (plan.shards.len(), plan.points, watch::duration(plan.setup));
+        let (count, points, setup) = (plan.shards.len(), plan.points, duration(plan.setup));
         let skipped = points - plan.solved;
         text.line(format_args!("{scene}: {points} points in {count} shards, {skipped} of them proven free"));
         let Forecast { contact_fraction, sampled, .. } = plan.forecast;
@@ -128,9 +129,9 @@ impl Describe for Planned {
                 format_args!(
                     "{} for all on {} threads such as here, {} for the longest shard, {setup} of it to set up; lower \
                      equilibria and the error come on top, in the merge",
-                    watch::duration(*all),
+                    duration(*all),
                     plan.threads,
-                    watch::duration(longest)
+                    duration(longest)
                 ),
             ),
             _ => text.row("time", format_args!("not predicted for a GPU; {setup} to set up each")),

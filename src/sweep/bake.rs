@@ -3,7 +3,7 @@
 use super::{BackendChoice, ChosenBackend, Progress, Run, Shard, Sweep, SweepReport};
 use crate::{
     Error, ErrorKind, JointVector, MAX_AXES,
-    contact::Model,
+    contact::{MeshRipple, Model},
     dataset::Dataset,
     object::{Compliance, LatticeError, Object},
     proxy::Chain,
@@ -31,6 +31,18 @@ pub fn build_object(scene: &Scene) -> Result<Object, Error> {
         let line = scene.text.lines().position(|line| line.trim_start_matches([' ', '[']).starts_with("object"));
         Error::on_line(&scene.path, line.map_or(1, |line| line + 1) as u64, source).of(ErrorKind::Scene)
     })
+}
+
+/// Remarks, before `model` is solved, on a mesh that shows through, and on cubes that make its object's compliance err,
+/// of which a warning is returned.
+pub fn remark_on_mesh(model: &Model<'_>) -> Option<String> {
+    if let Some(remedy) = MeshRipple::new(model).and_then(|ripple| ripple.remedy()) {
+        log::warn!("{remedy}");
+    }
+    let error = model.object.lattice_error(&model.compliance).filter(LatticeError::is_large)?;
+    let warning = format!("the lattice is coarse: {error}");
+    log::warn!("{warning}");
+    Some(warning)
 }
 
 /// How a scene is haptized.
@@ -125,10 +137,7 @@ impl Bake<'_> {
             }
         }
         sweep.binding.provenance.aim = aim;
-        let error = object.lattice_error(&model.compliance);
-        sweep
-            .warnings
-            .extend(error.filter(LatticeError::is_large).map(|error| format!("the lattice is coarse: {error}")));
+        sweep.warnings.extend(remark_on_mesh(&model));
         let run = Run { chunk: chosen.chunk(), stop, progress };
         work(&mut sweep, &mut chosen, run)
     }

@@ -47,8 +47,6 @@ pub struct Progress {
     pub footprint: Footprint,
     /// Expected cost of the sweep, if its points were sampled.
     pub forecast: Option<Forecast>,
-    /// How much a contact point feels the mesh, where that was looked at.
-    pub mesh_ripple: Option<MeshRipple>,
 }
 
 /// How a sweep is run; nothing of it changes the result.

@@ -168,6 +168,7 @@ impl Reference {
             cut: None,
             geometry: None,
             rounding: None,
+            rounded: None,
             friction: None,
         }
     }
