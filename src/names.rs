@@ -1,7 +1,7 @@
 //! Names from files: of joints, scenes, topics, devices. They are printed in lines and tables, where some characters
 //! would forge a line, hide what stands beside them or command a terminal. Counts and times as sentences have them.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, fmt};
 
 /// Whether `c` does more than to be seen: a control character, an end of a line or a paragraph, or one that changes the
 /// direction of text.
@@ -25,9 +25,10 @@ pub(crate) fn escaped(text: &str) -> Cow<'_, str> {
     escaped_but(text, &[])
 }
 
-/// Returns a number with its noun, in the singular or the plural.
-pub(crate) fn counted(count: usize, [one, more]: [&str; 2]) -> String {
-    format!("{count} {}", if count == 1 { one } else { more })
+/// Returns a whole number with its noun, in the singular or the plural.
+pub(crate) fn counted<N: fmt::Display + PartialEq + From<bool>>(count: N, [one, more]: [&str; 2]) -> String {
+    let noun = if count == N::from(true) { one } else { more };
+    format!("{count} {noun}")
 }
 
 /// Writes a time as people say it: `0.4 s`, `35 s`, `12 min`, `7.5 h`.

@@ -13,6 +13,7 @@ use super::{
     watch::{configurations, watched},
 };
 use crate::{
+    names::counted,
     scene::{ContactLaw, Scene},
     store::space::MAX_LEVELS,
     sweep::{Aim, BackendChoice, Bake, Shard, SweepReport},
@@ -124,8 +125,9 @@ impl Describe for BakedShard {
         let Some(sweep) = sweep else { return text.line(format_args!("{file}: shard {shard}, there already")) };
         let SweepReport { points, contact_points, resumed_points, seconds, backend, adapter, .. } = sweep;
         text.line(format_args!(
-            "{file}: shard {shard}, {points} points, {contact_points} in contact, {resumed_points} of an earlier run; \
-             {seconds:.2} s on {backend} ({adapter})"
+            "{file}: shard {shard}, {}, {contact_points} in contact, {resumed_points} of an earlier run; \
+             {seconds:.2} s on {backend} ({adapter})",
+            counted(*points, ["point", "points"])
         ));
     }
 }

@@ -154,7 +154,10 @@ pub fn describe_error(text: &mut Text, measured: Option<&MeasuredError>, aim: Op
     let without = if *left_out > 0 { format!("; {left_out} left out, which did not converge") } else { String::new() };
     text.row(
         "",
-        format_args!("of the rms torque, {torque:.4} {unit}, at {configurations} random configurations{without}"),
+        format_args!(
+            "of the rms torque, {torque:.4} {unit}, at {}{without}",
+            counted(*configurations, ["random configuration", "random configurations"])
+        ),
     );
     if let Some(aim) = aim {
         let verdict = if measured.keeps(aim) { "kept" } else { "missed" };

@@ -241,10 +241,7 @@ impl Describe for Inspected {
         }
         text.row(
             "solved",
-            format_args!(
-                "in {} to a residual of {residual:.1e}",
-                counted(*iterations as usize, ["iteration", "iterations"])
-            ),
+            format_args!("in {} to a residual of {residual:.1e}", counted(*iterations, ["iteration", "iterations"])),
         );
         let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
         text.line(format_args!(

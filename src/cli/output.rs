@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     dataset::{may_be_dataset, replace_file, resolved},
+    names::counted,
     render::recording::SIGNATURE as SESSION,
     scan::SIGNATURE,
     scene::Scene,
@@ -111,7 +112,7 @@ struct Earlier {
 impl Describe for Replaced {
     fn describe(&self, text: &mut Text) {
         let Earlier { bytes, date } = &self.replaced;
-        text.row("replaced", format_args!("an earlier file of {bytes} bytes from {date}"));
+        text.row("replaced", format_args!("an earlier file of {} from {date}", counted(*bytes, ["byte", "bytes"])));
     }
 }
 
@@ -264,7 +265,7 @@ impl Describe for Overwritten {
     fn describe(&self, text: &mut Text) {
         let Self { replaced, removed } = self;
         if !replaced.is_empty() {
-            text.row("replaced", format_args!("{} files of an earlier run", replaced.len()));
+            text.row("replaced", format_args!("{} of an earlier run", counted(replaced.len(), ["file", "files"])));
         }
         if !removed.is_empty() {
             text.row("removed", format_args!("{}, which an earlier run had left", removed.join(", ")));

@@ -74,14 +74,19 @@ impl Describe for BakedStore {
     fn describe(&self, text: &mut Text) {
         let Self { file, refined, uniform, backend, adapter, .. } = self;
         let Refined { nodes, by_level, equilibria, solved, rounds, lowered, .. } = refined;
-        text.line(format_args!("{file}: {nodes} nodes, {by_level:?} by level, {:.1} s", self.seconds));
+        text.line(format_args!(
+            "{file}: {}, {by_level:?} by level, {:.1} s",
+            counted(*nodes, ["node", "nodes"]),
+            self.seconds
+        ));
         describe_error(text, Some(&self.measured), Some(self.aim));
         text.row(
             "nodes",
             format_args!(
                 "{:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} solved, \
-                 {equilibria} equilibria, {}, on {backend} ({adapter})",
+                 {}, {}, on {backend} ({adapter})",
                 *uniform as f64 / (*nodes).max(1) as f64,
+                counted(*equilibria, ["equilibrium", "equilibria"]),
                 counted(*rounds, ["round", "rounds"])
             ),
         );

@@ -3,7 +3,7 @@
 use super::{Failure, bar::Bar, interrupt, tell};
 use crate::{
     dataset::Dataset,
-    names::duration,
+    names::{counted, duration},
     scene::Scene,
     sweep::{BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, MOST_CONFIGURATIONS, Progress},
 };
@@ -65,11 +65,15 @@ fn announce(progress: &Progress) {
             Some(format!("about {} of disk (twice that for a moment at the end)", megabytes(forecast.disk)))
         }
         // Few points, or a shard, which is not put together at the end.
-        (Bounds { least, most }, None) => Some(format!("{} to {} of disk", megabytes(*least), megabytes(*most))),
+        (Bounds { least, most }, None) => match [least, most].map(|bytes| megabytes(*bytes)) {
+            [least, most] if least == most => Some(format!("{most} of disk")),
+            [least, most] => Some(format!("{least} to {most} of disk")),
+        },
     };
     let size = size.map_or(String::new(), |size| format!(" and {size}"));
     tell(format_args!(
-        "haptize: {points} points{resumed}; results take at most {} of memory{size}",
+        "haptize: {}{resumed}; results take at most {} of memory{size}",
+        counted(*points, ["point", "points"]),
         megabytes(memory.most)
     ));
     let Some(Forecast { contact_fraction, seconds, sampled, .. }) = forecast else { return };

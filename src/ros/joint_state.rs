@@ -1,7 +1,7 @@
 //! `sensor_msgs/msg/JointState`.
 
 use super::cdr::{Decoder, Encoder};
-use crate::names;
+use crate::{names, names::counted};
 use std::collections::HashSet;
 
 /// Text of the message's definition, as MCAP files carry it. Field names and types are those of ROS 2.
@@ -80,11 +80,17 @@ impl JointState {
             let remedy = "give each joint a name of its own where they are published";
             return Err(format!("the name \"{twice}\" stands twice in it: {remedy}"));
         }
-        for (what, values) in
-            [("positions", &state.position), ("velocities", &state.velocity), ("efforts", &state.effort)]
-        {
+        for (what, values) in [
+            (["position", "positions"], &state.position),
+            (["velocity", "velocities"], &state.velocity),
+            (["effort", "efforts"], &state.effort),
+        ] {
             if !values.is_empty() && values.len() != state.names.len() {
-                return Err(format!("{} {what} for {} names", values.len(), state.names.len()));
+                return Err(format!(
+                    "{} for {}",
+                    counted(values.len(), what),
+                    counted(state.names.len(), ["name", "names"])
+                ));
             }
         }
         Ok(state)

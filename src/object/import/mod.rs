@@ -19,6 +19,7 @@ use crate::scene::Placement;
 use crate::{
     Error, ErrorKind,
     input::{self, GREATEST_INPUT},
+    names::counted,
 };
 use glam::DVec3;
 use std::collections::HashMap;
@@ -64,13 +65,19 @@ pub(super) fn read_of_any_size(
     let nodes = weld(nodes, &mut triangles);
     if nodes.len() < count && extension != "stl" {
         let (file, merged) = (file.display(), count - nodes.len());
-        warnings.push(format!("{file}: {merged} of {count} nodes lay exactly on another and were merged with it"));
+        warnings.push(format!(
+            "{file}: of {count} nodes {} merged with another in exactly the same place",
+            counted(merged, ["was", "were"])
+        ));
     }
     let faces = triangles.len();
     triangles.retain(|[a, b, c]| a != b && b != c && c != a);
     if triangles.len() < faces {
         let (file, dropped) = (file.display(), faces - triangles.len());
-        warnings.push(format!("{file}: {dropped} of {faces} faces had two corners in one place and were left out"));
+        warnings.push(format!(
+            "{file}: of {faces} faces {} left out, with two corners in one place",
+            counted(dropped, ["was", "were"])
+        ));
     }
     Ok((placement.place(nodes), triangles))
 }
@@ -91,7 +98,10 @@ pub(super) fn read_tetrahedra(
     let ordered = Body { regions: mesh.regions, ..ordered };
     if turned > 0 {
         let (file, all) = (file.display(), ordered.tetrahedra.len());
-        warnings.push(format!("{file}: {turned} of {all} tetrahedra were numbered inside out and were turned"));
+        warnings.push(format!(
+            "{file}: of {all} tetrahedra {} turned, numbered inside out",
+            counted(turned, ["was", "were"])
+        ));
     }
     Ok(ordered)
 }
