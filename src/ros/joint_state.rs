@@ -184,7 +184,7 @@ mod tests {
             }
         }
         let odd = JointState { effort: vec![1.0], ..golden() };
-        assert!(JointState::decode(&odd.encode()).unwrap_err().contains("1 efforts for 2 names"));
+        assert!(JointState::decode(&odd.encode()).unwrap_err().contains("1 effort for 2 names"));
         let twice = JointState { names: vec!["a".into(), "b".into(), "a".into()], ..JointState::default() };
         assert!(JointState::decode(&twice.encode()).unwrap_err().contains("\"a\" stands twice"));
         for name in ["a\nb", "a\u{2028}", "\u{202e}a"] {
