@@ -1,5 +1,5 @@
 //! Names from files: of joints, scenes, topics, devices. They are printed in lines and tables, where some characters
-//! would forge a line, hide what stands beside them or command a terminal.
+//! would forge a line, hide what stands beside them or command a terminal. Counts and times as sentences have them.
 
 use std::{
     borrow::Cow,
@@ -43,9 +43,20 @@ impl fmt::Display for Xml<'_> {
     }
 }
 
-/// Returns a number with its noun, in the singular or the plural.
-pub(crate) fn counted(count: usize, [one, more]: [&str; 2]) -> String {
-    format!("{count} {}", if count == 1 { one } else { more })
+/// Returns a whole number with its noun, in the singular or the plural.
+pub(crate) fn counted<N: fmt::Display + PartialEq + From<bool>>(count: N, [one, more]: [&str; 2]) -> String {
+    let noun = if count == N::from(true) { one } else { more };
+    format!("{count} {noun}")
+}
+
+/// Writes a time as people say it: `0.4 s`, `35 s`, `12 min`, `7.5 h`.
+pub(crate) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.1} s"),
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
 }
 
 /// Checks that `name` may be printed in a line.

@@ -8,6 +8,7 @@ use super::{
     tell,
 };
 use crate::{
+    names::counted,
     scene::{Interpolation, Scene},
     studies::accuracy::{self, Accuracy, Extent, LIVE, Limit, Offer, Row, Study},
     sweep::BackendChoice,
@@ -83,8 +84,9 @@ impl Describe for Measured {
         let Self { found, offers, limits, files, overwritten, folder } = self;
         let Accuracy { scene, configurations, in_contact, left_out, norm, torque, reference_error, .. } = found;
         text.line(format_args!(
-            "{scene}: {configurations} random configurations, {in_contact} in contact, {left_out} left out; rms torque \
-             {torque:.4} {norm}, the reference errs by {reference_error:.1e}"
+            "{scene}: {}, {in_contact} in contact, {left_out} left out; rms torque {torque:.4} {norm}, the reference errs by \
+             {reference_error:.1e}",
+            counted(*configurations, ["random configuration", "random configurations"])
         ));
         for name in Interpolation::ALL.map(Interpolation::name) {
             if let Some(order) = found.order(Study::Spacing, name) {
@@ -128,7 +130,7 @@ impl Describe for Measured {
             text.row("limited by", limits.join(", "));
         }
         found.notes.iter().for_each(|note| text.row("note", note));
-        text.row("written to", format_args!("{folder}, {} files", files.len()));
+        text.row("written to", format_args!("{folder}, {}", counted(files.len(), ["file", "files"])));
         overwritten.describe(text);
     }
 }

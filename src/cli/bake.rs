@@ -7,12 +7,13 @@ use super::{
     output::{self, Content},
     reach,
     refine::{self, RefinementGoal},
+    remarks,
     report::{Describe, Report, Text},
     shard::ShardChoice,
-    tell,
     watch::{configurations, watched},
 };
 use crate::{
+    names::counted,
     scene::{ContactLaw, Scene},
     store::space::MAX_LEVELS,
     sweep::{Aim, BackendChoice, Bake, Shard, SweepReport},
@@ -124,8 +125,9 @@ impl Describe for BakedShard {
         let Some(sweep) = sweep else { return text.line(format_args!("{file}: shard {shard}, there already")) };
         let SweepReport { points, contact_points, resumed_points, seconds, backend, adapter, .. } = sweep;
         text.line(format_args!(
-            "{file}: shard {shard}, {points} points, {contact_points} in contact, {resumed_points} of an earlier run; \
-             {seconds:.2} s on {backend} ({adapter})"
+            "{file}: shard {shard}, {}, {contact_points} in contact, {resumed_points} of an earlier run; \
+             {seconds:.2} s on {backend} ({adapter})",
+            counted(*points, ["point", "points"])
         ));
     }
 }
@@ -135,6 +137,6 @@ fn run_shard(arguments: &Arguments, scene: &Scene, shard: Shard) -> Result<Repor
     let folder = arguments.output.clone().unwrap_or_else(|| PathBuf::from("."));
     let (file, sweep) = watched(scene, arguments.backend, |bake| bake.to_shard(&folder, shard))?;
     let warnings = sweep.iter().flat_map(|sweep| &sweep.warnings);
-    warnings.for_each(|warning| tell(format_args!("haptize: {warning}")));
+    warnings.for_each(|warning| remarks::once(warning));
     Report::new(&BakedShard { sweep, file: file.display().to_string(), shard })
 }

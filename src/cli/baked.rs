@@ -3,14 +3,15 @@
 use super::{
     Failure,
     output::Replaced,
+    remarks,
     report::{Describe, Text},
-    tell, watch,
-    watch::{duration, megabytes},
+    tell,
+    watch::{self, megabytes},
 };
 use crate::{
     contact::MeshRipple,
     dataset::{Dataset, MeasuredError},
-    names::{counted, escaped},
+    names::{counted, duration, escaped},
     sweep::{Clearance, Iterations, Lowered, SweepReport},
 };
 use serde::Serialize;
@@ -45,12 +46,12 @@ const FREE: &str = "the arm touches the object at no grid point: the dataset is 
 
 impl Baked {
     /// Returns the report of `sweep`, which was baked into `file`, for the error `aim` over the rms torque (1) if any.
-    /// Its warnings are printed.
+    /// Its warnings are printed, but for those that were printed before the work.
     ///
     /// # Errors
     /// If nothing touches and the dataset cannot be read again.
     pub fn new(sweep: SweepReport, file: &Path, aim: Option<f64>, replaced: Option<Replaced>) -> Result<Self, Failure> {
-        sweep.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
+        sweep.warnings.iter().for_each(|warning| remarks::once(warning));
         let is_free = sweep.contact_points == 0;
         let clearance = if is_free { watch::warn_of_free_space(&Dataset::load(file)?)? } else { None };
         let bytes = std::fs::metadata(file).map_or(0, |file| file.len() as usize);
@@ -154,7 +155,10 @@ pub fn describe_error(text: &mut Text, measured: Option<&MeasuredError>, aim: Op
     let without = if *left_out > 0 { format!("; {left_out} left out, which did not converge") } else { String::new() };
     text.row(
         "",
-        format_args!("of the rms torque, {torque:.4} {unit}, at {configurations} random configurations{without}"),
+        format_args!(
+            "of the rms torque, {torque:.4} {unit}, at {}{without}",
+            counted(*configurations, ["random configuration", "random configurations"])
+        ),
     );
     if let Some(aim) = aim {
         let verdict = if measured.keeps(aim) { "kept" } else { "missed" };

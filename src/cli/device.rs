@@ -9,6 +9,7 @@ use super::{
 use crate::{
     control::{CheckReport, PUSH_SHARE, Phase, check},
     device::{Address, Coordinates, Finding, Guard, Key, Kind, LIMIT_SHARE, Watchdog, open},
+    names::counted,
     scene::Rendering,
 };
 use serde::Serialize;
@@ -222,7 +223,7 @@ fn describe_phase(text: &mut Text, report: &CheckReport, unit: &str) {
         };
         text.row("", format_args!("{a}: {least:.4} to {most:.4} {unit}{pushed}"));
     }
-    for (reason, ticks) in &report.tally.halted {
-        text.row("", format_args!("without torque for {ticks} ticks: {reason}"));
+    for (reason, count) in &report.tally.halted {
+        text.row("", format_args!("without torque for {}: {reason}", counted(*count, ["tick", "ticks"])));
     }
 }

@@ -192,9 +192,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let left_out =
             source.import.as_ref().map_or(String::new(), |import| format!(" (of the rows {})", import.left_out()));
         return Err(format!(
-            "none of the {} grid points lies between the {} samples{left_out}: give a smaller --step, or a log that \
+            "no grid point lies between the samples{left_out}, {}: give a smaller --step, or a log that \
              goes through more of the joints' ranges",
-            report.points, report.samples
+            counted(report.samples, ["one", "in all"])
         )
         .into());
     }
@@ -400,7 +400,8 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
 fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let total = total_size(logs);
     let bar = Bar::new("bytes", "{wide_bar} {bytes}/{total_bytes}, {msg}, {eta} left");
-    let mut progress = |progress: ImportProgress| bar.set(progress.bytes, total, format!("{} rows", progress.rows));
+    let mut progress =
+        |progress: ImportProgress| bar.set(progress.bytes, total, counted(progress.rows, ["row", "rows"]));
     let imported = import(mapping, logs, &mut progress);
     bar.finish();
     let Imported { samples, branches, histories, report } = imported?;
@@ -452,7 +453,8 @@ impl Describe for IdentifiedRelaxation {
         text.row(
             "",
             format_args!(
-                "told by {histories} histories to {:.1} % of their torque, rms{}",
+                "told by {} to {:.1} % of the torque, rms{}",
+                counted(*histories, ["history", "histories"]),
                 100.0 * misfit,
                 out.unwrap_or_default()
             ),
@@ -464,7 +466,13 @@ impl Describe for IdentifiedFriction {
     fn describe(&self, text: &mut Text) {
         let Self { coefficient, strokes, deviation, stiffness, predicted } = self;
         let builds_up = stiffness.map_or(String::new(), |k| format!(", builds up at {} N/m (N m/rad)", coarse(k)));
-        text.row("friction", format_args!("{coefficient:.3} +- {deviation:.3}, of {strokes} strokes{builds_up}"));
+        text.row(
+            "friction",
+            format_args!(
+                "{coefficient:.3} +- {deviation:.3}, of {}{builds_up}",
+                counted(*strokes, ["stroke", "strokes"])
+            ),
+        );
         for (joint, [with, without]) in predicted.iter().enumerate() {
             let joint = joint + 1;
             let left_out = if with < without { "" } else { ": it has none" };
@@ -485,10 +493,16 @@ impl Describe for Gridized {
         let Self { file, source, of, seconds, reading, import, left_out, .. } = self;
         let GridizeReport { samples, merged, points, inside, contact_points, epsilon, far, distance, .. } =
             &self.report;
-        text.line(format_args!("{file}: {inside} grid points of {points} inside the measured region"));
-        text.row("made from", format_args!("{samples} samples ({source}: {of})"));
+        text.line(format_args!(
+            "{file}: {inside} of {} inside the measured region",
+            counted(*points, ["grid point", "grid points"])
+        ));
+        text.row("made from", format_args!("{} ({source}: {of})", counted(*samples, ["sample", "samples"])));
         if *merged > 0 {
-            text.row("merged", format_args!("{merged} samples at the same configuration as another"));
+            text.row(
+                "merged",
+                format_args!("{} at the same configuration as another", counted(*merged, ["sample", "samples"])),
+            );
         }
         let unit = match &self.axes[..] {
             [first, others @ ..] if others.iter().all(|axis| axis.unit == first.unit) => first.effort_unit(),
@@ -505,16 +519,22 @@ impl Describe for Gridized {
             let told = told.join(", ");
             text.row(
                 "far",
-                format_args!("{far} grid points between the samples are left out, more than {told} from any"),
+                format_args!(
+                    "{} left out, more than {told} from any sample",
+                    counted(*far, ["grid point between the samples is", "grid points between the samples are"])
+                ),
             );
         }
-        text.row("in contact", format_args!("{contact_points} points, torque above {} {unit}", coarse(*epsilon)));
+        text.row(
+            "in contact",
+            format_args!("{}, torque above {} {unit}", counted(*contact_points, ["point", "points"]), coarse(*epsilon)),
+        );
         if *left_out > 0 {
             text.row("left out", counted(*left_out, ["row", "rows"]));
         }
         import.iter().flat_map(|import| &import.dropped).for_each(|dropped| text.row("", dropped));
         if let Some(import) = import {
-            text.row("rows", format_args!("{} read, {} gaps in time", import.rows, import.gaps));
+            text.row("rows", format_args!("{} read, {} in time", import.rows, counted(import.gaps, ["gap", "gaps"])));
         }
         let cells = import.as_ref().and_then(|import| import.cells.as_ref());
         if let Some(cells) = cells {
@@ -533,7 +553,13 @@ impl Describe for Gridized {
         }
         for (what, prediction) in [("held out", &self.held_out), ("against", &self.against)] {
             let Some(Prediction { samples, predicted, rms, worst, deviation }) = prediction else { continue };
-            text.row(what, format_args!("{samples} samples, {predicted} of them inside the grid and predicted"));
+            text.row(
+                what,
+                format_args!(
+                    "{}, {predicted} of them inside the grid and predicted",
+                    counted(*samples, ["sample", "samples"])
+                ),
+            );
             for (joint, axis) in self.axes.iter().enumerate().filter(|_| *predicted > 0) {
                 let own =
                     deviation.as_ref().map(|own| format!("; their own standard deviation {}", coarse(own[joint])));
@@ -549,7 +575,10 @@ impl Describe for Gridized {
             text.row("against", format_args!("memory included, to {:.1} % of the torque, rms", 100.0 * misfit));
         }
         if let Some(folder) = self.figures.first().and_then(|figure| Path::new(figure).parent()) {
-            text.row("figures", format_args!("{} files in {}", self.figures.len(), folder.display()));
+            text.row(
+                "figures",
+                format_args!("{} in {}", counted(self.figures.len(), ["file", "files"]), folder.display()),
+            );
         }
         text.row("time", format_args!("{seconds:.2} s, of these {reading:.2} s for reading"));
         if *contact_points > 0 {

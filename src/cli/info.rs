@@ -169,7 +169,10 @@ impl Describe for Summary {
             let Axis { name, unit, start, step, count } = axis;
             let last = axis.coordinate(count - 1);
             let effort = axis.effort_unit();
-            text.row(name, format_args!("{count} lines, {start:.4} to {last:.4} {unit} by {step:.4}"));
+            text.row(
+                name,
+                format_args!("{}, {start:.4} to {last:.4} {unit} by {step:.4}", counted(*count, ["line", "lines"])),
+            );
             text.row("", format_args!("{least:.4} to {greatest:.4} {effort}"));
         }
         if let Some(Refinement { nodes, bytes }) = &self.refinement {

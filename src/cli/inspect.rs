@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     ErrorKind, JointVector,
-    contact::{Model, NodeForce},
+    contact::{MeshRipple, Model, NodeForce},
     dataset::{Dataset, JointLabel, Surface},
     field::TorqueField,
     names::counted,
@@ -107,7 +107,6 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let warnings = outside(&chain, &scene.grid, q);
     warnings.iter().for_each(|warning| tell(format_args!("haptize: note: {warning}")));
     let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(q)])?;
-    object.warnings.iter().for_each(|warning| tell(format_args!("haptize: {warning}")));
     let dataset = dataset.as_ref();
     let solved = Inspection::new(&model, q);
     let page = match &arguments.html {
@@ -124,6 +123,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
         stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
         lattice: object.lattice_error(&model.compliance),
+        mesh_ripple: MeshRipple::new(&model),
         solved,
         warnings,
         body: Body { inclusions: info::inclusions(&scene.object), skin: object.skin },
@@ -145,6 +145,9 @@ struct Inspected {
     /// Where a lattice fills the object: the error that it makes.
     #[serde(skip_serializing_if = "Option::is_none")]
     lattice: Option<LatticeError>,
+    /// How much a contact point feels the mesh, where the compliance covers a facet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mesh_ripple: Option<MeshRipple>,
     /// Where there is a dataset: what it answers here.
     #[serde(skip_serializing_if = "Option::is_none")]
     interpolated: Option<Interpolated>,
@@ -264,10 +267,7 @@ impl Describe for Inspected {
         }
         text.row(
             "solved",
-            format_args!(
-                "in {} to a residual of {residual:.1e}",
-                counted(*iterations as usize, ["iteration", "iterations"])
-            ),
+            format_args!("in {} to a residual of {residual:.1e}", counted(*iterations, ["iteration", "iterations"])),
         );
         let untouched = proxy_nodes.iter().filter(|node| node.contact.is_none()).count();
         text.line(format_args!(
@@ -291,6 +291,7 @@ impl Describe for Inspected {
         }
         self.body.describe(text);
         self.lattice.iter().for_each(|error| text.row("lattice", error));
+        self.mesh_ripple.describe(text);
         if let Some(Interpolated { interpolation, torque, difference, .. }) = &self.interpolated {
             text.line(format_args!("the dataset, interpolated here ({}):", interpolation.name()));
             text.row("torque", efforts(torque));

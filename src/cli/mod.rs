@@ -53,6 +53,7 @@ mod playback_report;
 mod played;
 mod reach;
 mod refine;
+mod remarks;
 mod report;
 mod scan;
 mod shape;
@@ -202,6 +203,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     if !line.no_cache {
         Cache::of_user(|note| tell(format_args!("haptize: note: {note}"))).into_iter().for_each(Cache::begin);
     }
+    remarks::listen();
     crash::let_go_first();
     // What refines a grid keeps nothing before its end.
     let refines = matches.subcommand().is_some_and(|(_, given)| given.try_contains_id("refine").unwrap_or(false));

@@ -4,6 +4,7 @@ use super::{Failure, tell};
 use crate::{
     dataset::Dataset,
     device::Motion,
+    names::counted,
     render::setup::{Setup, labels},
     ros::{Course, is_mcap},
     scene::Waypoint,
@@ -57,10 +58,9 @@ fn recorded(setup: &Setup, dataset: &Dataset, file: &Path, topic: Option<&str>) 
     let course = Course::read(file, topic, &joints)?;
     if course.left_out > 0 {
         tell(format_args!(
-            "haptize: note: {}: {} messages of {} are left out: they lack a joint, or \
-             come no later than the one before",
+            "haptize: note: {}: {} of {} left out, for want of a joint, or because of a time no later than that before",
             file.display(),
-            course.left_out,
+            counted(course.left_out, ["message", "messages"]),
             course.topic
         ));
     }

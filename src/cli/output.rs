@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     dataset::{may_be_dataset, replace_file, resolved},
+    names::counted,
     render::recording::SIGNATURE as SESSION,
     report::page,
     scan::SIGNATURE,
@@ -126,7 +127,7 @@ struct Earlier {
 impl Describe for Replaced {
     fn describe(&self, text: &mut Text) {
         let Earlier { bytes, date } = &self.replaced;
-        text.row("replaced", format_args!("an earlier file of {bytes} bytes from {date}"));
+        text.row("replaced", format_args!("an earlier file of {} from {date}", counted(*bytes, ["byte", "bytes"])));
     }
 }
 
@@ -281,7 +282,7 @@ impl Describe for Overwritten {
     fn describe(&self, text: &mut Text) {
         let Self { replaced, removed } = self;
         if !replaced.is_empty() {
-            text.row("replaced", format_args!("{} files of an earlier run", replaced.len()));
+            text.row("replaced", format_args!("{} of an earlier run", counted(replaced.len(), ["file", "files"])));
         }
         if !removed.is_empty() {
             text.row("removed", format_args!("{}, which an earlier run had left", removed.join(", ")));

@@ -6,6 +6,7 @@ use super::{
     shell, watch,
 };
 use crate::{
+    names::{counted, duration},
     scene::Scene,
     sweep::{BackendChoice, Forecast, Plan},
 };
@@ -117,27 +118,38 @@ impl Lines {
 impl Describe for Planned {
     fn describe(&self, text: &mut Text) {
         let Self { scene, plan, seconds, lines } = self;
-        let (count, points, setup) = (plan.shards.len(), plan.points, watch::duration(plan.setup));
+        let (count, points, setup) = (plan.shards.len(), plan.points, duration(plan.setup));
         let skipped = points - plan.solved;
-        text.line(format_args!("{scene}: {points} points in {count} shards, {skipped} of them proven free"));
+        text.line(format_args!(
+            "{scene}: {} in {}, {skipped} of them proven free",
+            counted(points, ["point", "points"]),
+            counted(count, ["shard", "shards"])
+        ));
         let Forecast { contact_fraction, sampled, .. } = plan.forecast;
-        text.row("contact", format_args!("{:.0} % of {sampled} sampled points", 100.0 * contact_fraction));
+        text.row(
+            "contact",
+            format_args!(
+                "{:.0} % of {}",
+                100.0 * contact_fraction,
+                counted(sampled, ["sampled point", "sampled points"])
+            ),
+        );
         match (seconds, plan.longest()) {
             (Some(all), Some(longest)) => text.row(
                 "time",
                 format_args!(
-                    "{} for all on {} threads such as here, {} for the longest shard, {setup} of it to set up; lower \
+                    "{} for all on {} such as here, {} for the longest shard, {setup} of it to set up; lower \
                      equilibria and the error come on top, in the merge",
-                    watch::duration(*all),
-                    plan.threads,
-                    watch::duration(longest)
+                    duration(*all),
+                    counted(plan.threads, ["thread", "threads"]),
+                    duration(longest)
                 ),
             ),
             _ => text.row("time", format_args!("not predicted for a GPU; {setup} to set up each")),
         }
         let solved = || plan.shards.iter().map(|shard| shard.solved);
         let (least, most) = (solved().min().unwrap_or(0), solved().max().unwrap_or(0));
-        text.row("balance", format_args!("{least} to {most} points to be solved in a shard"));
+        text.row("balance", format_args!("{least} to {} to be solved in a shard", counted(most, ["point", "points"])));
         let shard = plan.shards.iter().map(|shard| shard.bytes).max().unwrap_or(0);
         let [shard, dataset, memory] = [shard, plan.dataset, plan.memory].map(watch::megabytes);
         text.row("disk", format_args!("{shard} a shard, {dataset} the dataset, twice that for a moment in the merge"));

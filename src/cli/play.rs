@@ -7,7 +7,7 @@ use super::{
     motion,
     output::{self, Content, Folder, Overwritten, Replaced, Written},
     playback_report::{Beside, PlaybackReport},
-    played::{FILES, Played, SNAPSHOTS, describe_session, play, play_timed, traced, unwritten, write},
+    played::{FILES, Played, SNAPSHOTS, describe_session, play, play_timed, ticks, traced, unwritten, write},
     report::{self, Describe, Report, Text},
     tell,
     watch::warn_of_free_space,
@@ -16,6 +16,7 @@ use crate::{
     dataset::{Dataset, JointLabel, replace_file},
     device::{Address, Device, Guard, Key, Kind, Motion, Recorded, Tally, attach, open},
     gridize::with_energy,
+    names::counted,
     render::{
         live::LiveScene,
         passivity::Bound,
@@ -196,6 +197,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         }
         None => None,
     };
+    let begins_in_contact = trace.ticks.first().is_some_and(|tick| tick.sample.contact);
     files.extend(write(&setup, &dataset, &played, &folder)?);
     let twin = setup.haptics.source().twinned().map(|field| TwinError::along(field, trace));
     if let Some(twin) = &twin {
@@ -225,6 +227,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         replayed: told.is_some(),
         device: arguments.device.as_ref().map(|device| Driven { name: device.to_string(), tally }),
         clearance,
+        begins_in_contact,
         thin_part,
         twin,
         felt,
@@ -259,6 +262,8 @@ struct PlayedSession {
     device: Option<Driven>,
     /// How near arm and object come where nothing touches.
     clearance: Option<Clearance>,
+    /// Whether arm and object touch in the first tick, so that nothing says from which side the arm came.
+    begins_in_contact: bool,
     /// What to tell of a part of the object that the arm got through, or gets through somewhere in the dataset.
     #[serde(skip_serializing_if = "Option::is_none")]
     thin_part: Option<String>,
@@ -319,10 +324,15 @@ impl Describe for PlayedSession {
         if let Some(stiffness) = &self.border {
             text.row("border", format_args!("holds the device with the coupling's stiffness Kvc: {stiffness}"));
         }
+        if self.begins_in_contact {
+            let what = "the session begins in contact, which is with the closest surface, from whichever side the arm came: \
+                        begin in free space";
+            text.row("note", what);
+        }
         self.thin_part.iter().for_each(|told| text.row("note", told));
         if let Some(TwinError { factor, rms, .. }) = &self.twin {
             let Summary { twin_ticks, twin_alone, .. } = &self.summary;
-            text.row("twin", format_args!("answers in {twin_ticks} ticks, {twin_alone} of these alone"));
+            text.row("twin", format_args!("answers in {}, {twin_alone} of these alone", ticks(*twin_ticks)));
             let error =
                 rms.map_or(String::new(), |rms| format!("; along this way it errs by {:.1} % rms", 100.0 * rms));
             text.row("", format_args!("times {factor:.3} it meets what was measured at the border{error}"));
@@ -333,11 +343,14 @@ impl Describe for PlayedSession {
             text.row("fault", format_args!("at {time:.4} s the torque went to zero: {reason}; {remedy}"));
         }
         if let Some(Driven { tally, .. }) = &self.device {
-            for (clamp, ticks) in &tally.clamped {
-                text.row("device", format_args!("torque clamped by {clamp} for {ticks} ticks"));
+            for (clamp, count) in &tally.clamped {
+                text.row(
+                    "device",
+                    format_args!("torque clamped by {clamp} for {}", counted(*count, ["tick", "ticks"])),
+                );
             }
-            for (reason, ticks) in &tally.halted {
-                text.row("device", format_args!("without torque for {ticks} ticks: {reason}"));
+            for (reason, count) in &tally.halted {
+                text.row("device", format_args!("without torque for {}: {reason}", counted(*count, ["tick", "ticks"])));
             }
             if let Some(reason) = &tally.stopped {
                 text.row("device", format_args!("stopped for good: {reason}; run play again to open it"));
@@ -449,7 +462,7 @@ fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, Stri
             format!("{}: the session differs from tick {tick}, at {time:.4} s, on: {why}", file.display()).into()
         );
     }
-    let told = format!("{} ticks replayed, torque and proxy equal to the last bit", recording.ticks());
+    let told = format!("{} replayed, torque and proxy equal to the last bit", ticks(recording.ticks()));
     Ok((Played { trace: trace.into(), timing: None }, told))
 }
 
@@ -478,9 +491,11 @@ fn record(
 ) -> Result<(), Failure> {
     let lost = played.timing.as_ref().map_or(0, |timing| timing.unrecorded);
     if lost > 0 {
-        return Err(
-            format!("{lost} ticks were not recorded, the machine is too busy: nothing is written; try again").into()
-        );
+        return Err(format!(
+            "{} not recorded, the machine is too busy: nothing is written; try again",
+            counted(lost, ["tick was", "ticks were"])
+        )
+        .into());
     }
     if output::is_mcap(file) {
         let mut facts = BTreeMap::from([

@@ -137,7 +137,7 @@ fn exchanged(joules: f64) -> String {
 }
 
 /// Returns a number of ticks in words.
-fn ticks(count: usize) -> String {
+pub fn ticks(count: usize) -> String {
     counted(count, ["tick", "ticks"])
 }
 
@@ -149,7 +149,7 @@ pub fn describe_session(text: &mut Text, head: &str, s: &Summary, joints: &[Join
     // What was measured, and a store, do not say how many nodes of the object are in contact.
     let nodes = match s.max_contact_nodes {
         0 => String::new(),
-        nodes => format!(", {}", counted(nodes as usize, ["object node", "object nodes"])),
+        nodes => format!(", {}", counted(nodes, ["object node", "object nodes"])),
     };
     text.row("contact", format_args!("at most {}{nodes}", sizes(s.max_contact_torque, s.max_contact_force)));
     let proxy = sizes(s.max_contact_torque_step, s.max_contact_force_step);
@@ -192,8 +192,10 @@ impl Describe for Timing {
         text.row(
             "missed",
             format_args!(
-                "{missed_deadlines} deadlines (ticks left out because an earlier one ran late), {missed_frames} \
-                 frames, {unrecorded} records"
+                "{} (ticks left out because an earlier one ran late), {}, {}",
+                counted(*missed_deadlines, ["deadline", "deadlines"]),
+                counted(*missed_frames, ["frame", "frames"]),
+                counted(*unrecorded, ["record", "records"])
             ),
         );
         if *late == 0 {

@@ -6,6 +6,7 @@ use super::{
     tell, watch,
 };
 use crate::{
+    names::duration,
     scene::{Scene, SceneText},
     sweep::{Aim, BackendChoice, Cost, JointReach, Pilot, Reach},
 };
@@ -201,7 +202,7 @@ impl Describe for Reached {
         for Cost { relative, points, seconds, bytes, is_known, .. } in &self.costs {
             let doubt = if *is_known { "" } else { "   far beyond what was tried" };
             let [error, points] = [format!("{} %", 100.0 * relative), format!("{points:.2e}")];
-            let [time, size] = [watch::duration(*seconds), watch::megabytes(*bytes as usize)];
+            let [time, size] = [duration(*seconds), watch::megabytes(*bytes as usize)];
             text.line(format_args!("{error:<14} {points:<13} {time:<19} {size}{doubt}"));
         }
         for found in self.grid.iter().chain(&self.refusal) {

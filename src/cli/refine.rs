@@ -4,6 +4,7 @@ use super::{
     Failure,
     baked::{describe_error, describe_left_to_cpu},
     output::Replaced,
+    remarks,
     report::{Describe, Report, Text},
     tell,
     watch::megabytes,
@@ -18,7 +19,7 @@ use crate::{
     sweep::{
         Aim, BackendChoice, ChosenBackend, CpuBackend, Reference, build_object, grid_of,
         refine::{Refine, Refined},
-        sample,
+        remark_on_mesh, sample,
     },
 };
 use serde::Serialize;
@@ -73,14 +74,19 @@ impl Describe for BakedStore {
     fn describe(&self, text: &mut Text) {
         let Self { file, refined, uniform, backend, adapter, .. } = self;
         let Refined { nodes, by_level, equilibria, solved, rounds, lowered, .. } = refined;
-        text.line(format_args!("{file}: {nodes} nodes, {by_level:?} by level, {:.1} s", self.seconds));
+        text.line(format_args!(
+            "{file}: {}, {by_level:?} by level, {:.1} s",
+            counted(*nodes, ["node", "nodes"]),
+            self.seconds
+        ));
         describe_error(text, Some(&self.measured), Some(self.aim));
         text.row(
             "nodes",
             format_args!(
                 "{:.1} times fewer than the {uniform} of a uniform grid of the finest spacing; {solved} solved, \
-                 {equilibria} equilibria, {}, on {backend} ({adapter})",
+                 {}, {}, on {backend} ({adapter})",
                 *uniform as f64 / (*nodes).max(1) as f64,
+                counted(*equilibria, ["equilibrium", "equilibria"]),
                 counted(*rounds, ["round", "rounds"])
             ),
         );
@@ -109,6 +115,7 @@ pub fn run(
     let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
     model.with_tangent = true;
     model.with_slip = scene.haptics.uses_slip();
+    let warning = remark_on_mesh(&model).and_then(|error| error.warning());
     let solving = Instant::now();
     let seen = Reference::in_contact(scene, &model, 1, JUDGED)?;
     let each = solving.elapsed().as_secs_f64() / seen.solved() as f64;
@@ -121,8 +128,9 @@ pub fn run(
     refine.batch = backend.chunk();
     let each = backend.is_cpu_alone().then_some(each);
     let most_memory = announce(&refine, &judges[0], each);
-    let refined = refine.fill(&mut judges, &mut backend)?;
-    refined.notices.iter().for_each(|notice| tell(format_args!("haptize: {notice}")));
+    let mut refined = refine.fill(&mut judges, &mut backend)?;
+    refined.notices.splice(0..0, warning);
+    refined.notices.iter().for_each(|notice| remarks::once(notice));
     let measured = judges[1].measure(&refined.store, &model);
     let (kept, memory, blocks) = (measured.keeps(aim), refined.store.bytes(), refined.store.blocks().len());
     let provenance = Provenance {

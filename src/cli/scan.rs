@@ -134,7 +134,10 @@ impl Describe for Scanned {
     fn describe(&self, text: &mut Text) {
         let Self { report, file, next } = self;
         let ScanReport { steady, points, seconds, rig, .. } = report;
-        text.line(format_args!("{file}: {steady} of {points} points measured in {seconds:.0} s on the rig's clock"));
+        text.line(format_args!(
+            "{file}: {steady} of {} measured in {seconds:.0} s on the rig's clock",
+            counted(*points, ["point", "points"])
+        ));
         text.row("rig", rig);
         for (count, what) in [
             (report.unsteady, "not steady in time, left out by gridize"),
@@ -212,8 +215,10 @@ impl Describe for WrittenPlan {
         let Self { file, rows, points, unreachable, seconds, dwell, replaced } = self;
         let reached = points - unreachable;
         text.line(format_args!(
-            "{file}: {rows} rows through {reached} points in {seconds:.0} s, {dwell} s at each; {unreachable} points \
-             are not reached by the joints"
+            "{file}: {} through {} in {seconds:.0} s, {dwell} s at each; {} not reached by the joints",
+            counted(*rows, ["row", "rows"]),
+            counted(reached, ["point", "points"]),
+            counted(*unreachable, ["point is", "points are"])
         ));
         text.row("note", "limits of torque and speed are the robot's own: nothing of haptize watches it");
         replaced.describe(text);

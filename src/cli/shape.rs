@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     dataset::replace_file,
+    names::counted,
     proxy::Chain,
     report::{PIXELS, scanned::surface},
     scan::ScanLog,
@@ -140,8 +141,12 @@ impl Describe for Found {
         let mm = |length: &f64| 1e3 * length;
         text.line(format_args!("{file}: a surface of {nodes} nodes and {triangles} triangles"));
         let others = match begun {
-            0 => format!("{untouched} never touch"),
-            _ => format!("{untouched} never touch, {begun} touch from the first row on and are left out"),
+            0 => counted(*untouched, ["never touches", "never touch"]),
+            _ => format!(
+                "{}, {} left out, in contact from the first row on",
+                counted(*untouched, ["never touches", "never touch"]),
+                counted(*begun, ["is", "are"])
+            ),
         };
         text.row("approaches", format_args!("{onsets} with an onset, {:.1} mm apart; {others}", mm(spacing)));
         text.row("onset", format_args!("torque rises with the power {exponent:.2} of depth"));
@@ -154,7 +159,13 @@ impl Describe for Found {
             ),
         );
         let Carving { places, carved } = carving;
-        text.row("carving", format_args!("{places} free places of nodes, {carved} of which moved the surface"));
+        text.row(
+            "carving",
+            format_args!(
+                "{} of nodes, {carved} of which moved the surface",
+                counted(*places, ["free place", "free places"])
+            ),
+        );
         let guess = "a guess, one spacing below the lowest place that was reached: give its height by --ground";
         text.row("ground", format_args!("z = {ground:.4} m, {}", if *ground_is_given { "as given" } else { guess }));
         if *arm_nodes > 1 {

@@ -170,9 +170,9 @@ impl Twin {
         }
         if 2 * counted < rows {
             doubts.push(format!(
-                "{} of {rows} rows in contact say nothing of the twin, as the surface closest to the arm is none that was touched: \
+                "of {rows} rows in contact {} nothing of the twin, as the surface closest to the arm is none that was touched: \
                  it is at a border, or past the middle of the body; the grid leaves out what is deeper than {:.1} mm",
-                rows - counted,
+                crate::names::counted(rows - counted, ["row says", "rows say"]),
                 1e3 * deepest
             ));
         }

@@ -141,7 +141,9 @@ impl Describe for Shown {
     fn describe(&self, text: &mut Text) {
         if let Some(file) = &self.file {
             match self.stills {
-                Some(stills) => text.line(format_args!("wrote {file}, {stills} stills")),
+                Some(stills) => {
+                    text.line(format_args!("wrote {file}, {}", crate::names::counted(stills, ["still", "stills"])))
+                }
                 None => text.line(format_args!("wrote {file}")),
             }
         }

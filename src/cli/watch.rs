@@ -3,6 +3,7 @@
 use super::{Failure, bar::Bar, interrupt, tell};
 use crate::{
     dataset::Dataset,
+    names::{counted, duration},
     scene::Scene,
     sweep::{BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, MOST_CONFIGURATIONS, Progress},
 };
@@ -56,9 +57,6 @@ pub fn warn_of_free_space(dataset: &Dataset) -> Result<Option<Clearance>, Failur
 
 /// Prints what the sweep is going to take, before it begins.
 fn announce(progress: &Progress) {
-    if let Some(remedy) = progress.mesh_ripple.and_then(|ripple| ripple.remedy()) {
-        tell(format_args!("haptize: {remedy}"));
-    }
     let Progress { points, done, footprint: Footprint { memory, disk }, forecast, .. } = progress;
     let resumed = if *done > 0 { format!(", {done} of them done") } else { String::new() };
     let size = match (disk, forecast) {
@@ -67,11 +65,15 @@ fn announce(progress: &Progress) {
             Some(format!("about {} of disk (twice that for a moment at the end)", megabytes(forecast.disk)))
         }
         // Few points, or a shard, which is not put together at the end.
-        (Bounds { least, most }, None) => Some(format!("{} to {} of disk", megabytes(*least), megabytes(*most))),
+        (Bounds { least, most }, None) => match [least, most].map(|bytes| megabytes(*bytes)) {
+            [least, most] if least == most => Some(format!("{most} of disk")),
+            [least, most] => Some(format!("{least} to {most} of disk")),
+        },
     };
     let size = size.map_or(String::new(), |size| format!(" and {size}"));
     tell(format_args!(
-        "haptize: {points} points{resumed}; results take at most {} of memory{size}",
+        "haptize: {}{resumed}; results take at most {} of memory{size}",
+        counted(*points, ["point", "points"]),
         megabytes(memory.most)
     ));
     let Some(Forecast { contact_fraction, seconds, sampled, .. }) = forecast else { return };
@@ -86,16 +88,6 @@ fn announce(progress: &Progress) {
     let percent = 100.0 * contact_fraction;
     let digits = if percent < 1.0 { 2 } else { 0 };
     tell(format_args!("haptize: predicted from a sample of {sampled}: {percent:.digits$} % in contact{time}"));
-}
-
-/// Writes a time as people say it: `0.4 s`, `35 s`, `12 min`, `7.5 h`.
-pub fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 10.0 => format!("{s:.1} s"),
-        s if s < 120.0 => format!("{s:.0} s"),
-        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    }
 }
 
 /// Rounded up, with unit.

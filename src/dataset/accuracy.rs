@@ -29,10 +29,13 @@ pub struct MeasuredError {
     /// What the geometry at rest leaves out; absent where that was not solved, or not looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub geometry: Option<GeometryError>,
-    /// Length over which contact could be rounded, for this body and grid; absent where it is, where the law does not, and
-    /// where a part is too thin (m).
+    /// Length over which contact could be rounded, for this body and grid; absent where it nearly is, where the law does
+    /// not, and where a part is too thin (m).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounding: Option<f64>,
+    /// Length over which contact is rounded; absent where it is not (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounded: Option<f64>,
     /// How far friction lies above that of the contacts; absent where the scene names none, or no two touch at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionExcess>,
@@ -172,21 +175,7 @@ impl MeasuredError {
         let mut lines: Vec<String> = errors.into_iter().map(line).collect();
         if let Some(cut) = self.cut {
             let remedy = match cut > TELLING_CUT && self.relative().is_some_and(|error| error > TELLING_ERROR) {
-                true => match (self.rounding, self.geometry) {
-                    (Some(length), _) => format!(
-                        ": if a finer grid does not help, round = {length:.4} in [contact] rounds the body's edges, and takes \
-                         some 3 times as long"
-                    ),
-                    (None, Some(_)) => {
-                        ": if a finer grid does not help, law = \"following\" leaps less at edges, and takes \
-                                        4 to 8 times as long on a CPU"
-                            .to_owned()
-                    }
-                    (None, None) => {
-                        ": if a finer grid does not help, the body has several equilibria there, or sharp edges"
-                            .to_owned()
-                    }
-                },
+                true => self.remedy_for_cuts(),
                 false => String::new(),
             };
             let percent = 100.0 * cut;
@@ -211,6 +200,31 @@ impl MeasuredError {
             ));
         }
         lines
+    }
+
+    /// What keeps the torque from leaping within a cell, after a colon.
+    fn remedy_for_cuts(&self) -> String {
+        match (self.rounding, self.rounded, self.geometry) {
+            (Some(length), None, _) => format!(
+                ": if a finer grid does not help, round = {length:.4} in [contact] rounds the body's edges, and takes some 3 \
+                 times as long"
+            ),
+            (Some(length), Some(_), _) => {
+                format!(": round = {length:.4} in [contact] is what this grid follows, or a finer grid")
+            }
+            (None, Some(length), _) => format!(
+                ": the body's edges are rounded over {:.1} mm: give a grid whose steps move the arm by less than that",
+                1e3 * length
+            ),
+            (None, None, Some(_)) => {
+                ": if a finer grid does not help, law = \"following\" leaps less at edges, and takes 4 to \
+                                      8 times as long on a CPU"
+                    .to_owned()
+            }
+            (None, None, None) => {
+                ": if a finer grid does not help, the body has several equilibria there, or sharp edges".to_owned()
+            }
+        }
     }
 }
 
@@ -237,6 +251,7 @@ mod tests {
             cut: None,
             geometry: None,
             rounding: None,
+            rounded: None,
             friction: None,
         };
         assert!((measured.relative().unwrap() - 0.01).abs() < 1e-15);
@@ -272,6 +287,15 @@ mod tests {
             told.iter().any(|line| line.contains("`cut`") && line.contains("round = 0.0045 in [contact]")),
             "{told:?}"
         );
+        // A scene that is rounded is not sent to a law that rounds nothing.
+        let round = |rounding| {
+            let rounded = Some(0.002);
+            let round = MeasuredError { cut: Some(0.28), geometry, rounding, rounded, ..measured.clone() };
+            MeasuredError { interpolation: "linear".into(), ..round }.lines().swap_remove(2)
+        };
+        let [longer, finer] = [Some(0.00452), None].map(round);
+        assert!(longer.contains("round = 0.0045 in [contact]") && !longer.contains("following"), "{longer}");
+        assert!(finer.contains("rounded over 2.0 mm: give a grid") && !finer.contains("following"), "{finer}");
         let excess = FrictionExcess { configurations: 2, mean: 0.0123, greatest: 0.3 };
         let told = MeasuredError { friction: Some(excess), ..measured.clone() }.lines();
         assert!(told[2].contains("up to 30.0 %") && told[2].contains("1.2 % on average"), "{told:?}");

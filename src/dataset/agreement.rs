@@ -4,7 +4,10 @@
 //! parts, so that they can be compared.
 
 use super::{Dataset, Surface};
-use crate::scene::{Rendering, Shape};
+use crate::{
+    names::counted,
+    scene::{Rendering, Shape},
+};
 use glam::DVec3;
 
 /// Greatest share of its radius by which a node of a sphere is off it: what rounding leaves of coordinates far from the
@@ -24,7 +27,11 @@ impl Dataset {
         let scene = Rendering::parse(&self.scene, "scene").map_err(|error| error.to_string())?;
         let (axes, joints) = (&self.grid.axes, &scene.proxy.joints);
         if axes.len() != joints.len() {
-            return Err(format!("the grid has {} axes and the proxy of the scene {} joints", axes.len(), joints.len()));
+            return Err(format!(
+                "the grid has {} and the proxy of the scene {}",
+                counted(axes.len(), ["axis", "axes"]),
+                counted(joints.len(), ["joint", "joints"])
+            ));
         }
         for (axis, joint) in axes.iter().zip(joints) {
             let unit = joint.kind.unit();

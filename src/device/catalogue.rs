@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     Error, JointVector, error,
+    names::counted,
     proxy::Chain,
     scene::{DeviceSpec, HandSpec, Rendering, Waypoint},
 };
@@ -298,7 +299,8 @@ pub fn attach_joints(guard: Guard, address: &Address, joints: usize, spec: &Devi
             Err("the device measures where its tip is, not its joints: a scan needs a joint-true one".into())
         }
         Coordinates::Joints(device) if device != joints => Err(error!(
-            "the device has {device} joints and the scene's arm {joints}: take the device that the scene is for"
+            "the device has {} and the scene's arm {joints}: take the device that the scene is for",
+            counted(device, ["joint", "joints"])
         )),
         Coordinates::Joints(_) => mapped(guard, address, spec).map(|(guard, map)| JointDevice::new(guard, map)),
     }

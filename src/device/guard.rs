@@ -16,7 +16,7 @@
 use super::{
     Clamps, Coordinates, Halt, Hardware, Key, Limits, Measurement, Scheduler, halt::LONGEST_AGE, hardware::Command,
 };
-use crate::{Error, JointVector, error, scene::GREATEST_INTERVAL};
+use crate::{Error, JointVector, error, names::counted, scene::GREATEST_INTERVAL};
 use std::sync::{
     Arc,
     atomic::{AtomicBool, Ordering},
@@ -119,7 +119,9 @@ impl Guard {
         let (given, device) = (limits.len(), self.most.len());
         if given != device {
             return Err(error!(
-                "[device] in the scene: effort_limit has {given} numbers for {device} coordinates of the device"
+                "[device] in the scene: effort_limit has {} for {} of the device",
+                counted(given, ["number", "numbers"]),
+                counted(device, ["coordinate", "coordinates"])
             ));
         }
         self.most.iter_mut().zip(limits.iter()).for_each(|(most, limit)| *most = most.min(limit.max(0.0)));

@@ -8,6 +8,7 @@
 use super::{Applied, Device, Motion, Reading};
 use crate::{
     Error, JointVector, error,
+    names::counted,
     scene::{HandSpec, HapticsSpec},
 };
 
@@ -21,7 +22,7 @@ pub struct SimulatedHand {
 
 /// The error of a hand that is told of `told` joints where its device has `device`.
 pub(super) fn other_joints(told: usize, device: usize) -> Error {
-    error!("the hand is told {told} joints and the haptic device has {device}")
+    error!("the hand is told {} and the haptic device has {device}", counted(told, ["joint", "joints"]))
 }
 
 impl SimulatedHand {

@@ -4,7 +4,7 @@
 //! The joints of a parallelogram are measured against the ground where a serial chain's are relative; the rows of A
 //! subtract them. For a Cartesian device q is a position in the scene (m) and A turns (and scales) the device's axes.
 
-use crate::{Error, JointVector, MAX_JOINTS, error};
+use crate::{Error, JointVector, MAX_JOINTS, error, names::counted};
 use faer::{Mat, linalg::solvers::DenseSolveCore};
 
 /// The map of a device, and its inverse.
@@ -109,7 +109,11 @@ impl LinearMap {
 }
 
 fn other_size(count: usize) -> Error {
-    error!("map and offset must have {count} rows of {count} numbers, one for each coordinate of the device")
+    error!(
+        "map and offset must have {} of {}, one for each coordinate of the device",
+        counted(count, ["row", "rows"]),
+        counted(count, ["number", "numbers"])
+    )
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::{
     dataset::JointLabel,
     error,
     input::GREATEST_INPUT,
+    names::counted,
     scene::{JointKind, JointSpec, Waypoint},
 };
 use std::path::Path;
@@ -74,7 +75,10 @@ impl Motion {
     /// names file and line.
     pub fn from_csv(file: &Path, labels: &[JointLabel]) -> Result<Self, Error> {
         let joints = labels.len();
-        let sample = format!("each line gives a time in seconds and {joints} coordinates, separated by commas");
+        let sample = format!(
+            "each line gives a time in seconds and {}, separated by commas",
+            counted(joints, ["coordinate", "coordinates"])
+        );
         let mut lines = Lines::open(file, GREATEST_FILE, "not a motion")?;
         let (mut waypoints, mut line): (Vec<Waypoint>, _) = (Vec::new(), Vec::new());
         let mut columns: Option<Columns> = None;
@@ -227,7 +231,7 @@ impl Columns {
     fn sample(&self, text: &str) -> Result<Waypoint, String> {
         let fields: Vec<&str> = fields(text, ',').collect();
         if fields.len() != self.count {
-            return Err(format!("{} numbers", fields.len()));
+            return Err(counted(fields.len(), ["number", "numbers"]));
         }
         let number = |column: usize| {
             let field = fields.get(column).copied().unwrap_or_default();

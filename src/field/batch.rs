@@ -1,7 +1,7 @@
 //! Many look-ups at once, on all cores: row k of an output is made from row k of the configurations.
 
 use super::TorqueField;
-use crate::{Error, error};
+use crate::{Error, error, names::counted};
 use rayon::prelude::*;
 
 /// Rows that one thread takes at a time: some tens of microseconds of work, beside which sharing them out costs
@@ -9,7 +9,12 @@ use rayon::prelude::*;
 const SHARE: usize = 256;
 
 fn other_length(buffer: &str, found: usize, expected: usize, [rows, joints]: [usize; 2]) -> Error {
-    error!("the {buffer} hold {found} numbers where {expected} are needed: {rows} configurations of {joints} joints")
+    error!(
+        "the {buffer} hold {} where {expected} are needed: {} of {}",
+        counted(found, ["number", "numbers"]),
+        counted(rows, ["configuration", "configurations"]),
+        counted(joints, ["joint", "joints"])
+    )
 }
 
 /// Checks `configurations`, `joints` coordinates each, and returns their number.

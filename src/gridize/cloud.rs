@@ -9,7 +9,7 @@
 //! hash of a point's own coordinates, hence the same in every run and in any order.
 
 use super::samples::Samples;
-use crate::{Error, MAX_AXES, error, random::mix};
+use crate::{Error, MAX_AXES, error, names::counted, random::mix};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -59,7 +59,11 @@ pub(super) struct Cloud {
 /// The error of so few distinct samples that they cannot span `joints` joints.
 fn too_few(have: usize, joints: usize) -> Error {
     let need = joints + 1;
-    error!("{have} distinct samples cannot span {joints} joints; at least {need} are needed")
+    error!(
+        "{} cannot span {}; at least {need} are needed",
+        counted(have, ["distinct sample", "distinct samples"]),
+        counted(joints, ["joint", "joints"])
+    )
 }
 
 impl Cloud {

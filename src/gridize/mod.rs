@@ -41,6 +41,7 @@ use crate::{
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
     error,
+    names::counted,
     scene::GRID_LINE,
 };
 use cloud::{Cloud, JITTER, distance};
@@ -228,7 +229,11 @@ fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, Error> {
     let joints = samples.joints.len();
     if steps.len() != 1 && steps.len() != joints {
         let have = steps.len();
-        return Err(error!("{have} grid steps were given for {joints} joints: give one step, or one a joint"));
+        return Err(error!(
+            "{} given for {}: give one step, or one a joint",
+            counted(have, ["grid step was", "grid steps were"]),
+            counted(joints, ["joint", "joints"])
+        ));
     }
     let mut axes = Vec::with_capacity(joints);
     let mut points = 1.0;

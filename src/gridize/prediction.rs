@@ -7,7 +7,7 @@
 //! not predicted.
 
 use super::{GridizeOptions, Samples, gridize};
-use crate::{Error, contact::Status, dataset::Dataset, error};
+use crate::{Error, contact::Status, dataset::Dataset, error, names::counted};
 
 /// Predicted beside measured torque.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -33,7 +33,8 @@ pub fn held_out(samples: &Samples, options: &GridizeOptions, share: f64) -> Resu
     if rest.is_empty() || left_out.is_empty() || !share.is_finite() {
         let samples = samples.len();
         return Err(error!(
-            "a share of {share} of {samples} samples cannot be held out: it must leave some on both sides"
+            "a share of {share} of {} cannot be held out: it must leave some on both sides",
+            counted(samples, ["sample", "samples"])
         ));
     }
     let (dataset, _) = gridize(&rest, options).map_err(|error| error.within("without the samples held out"))?;
@@ -49,7 +50,7 @@ pub fn predict(dataset: &Dataset, samples: &Samples) -> Result<Prediction, Error
     let joints = dataset.grid.joints();
     if samples.joints.len() != joints {
         let found = samples.joints.len();
-        return Err(error!("the samples have {found} joints, the dataset has {joints}"));
+        return Err(error!("the samples have {}, the dataset has {joints}", counted(found, ["joint", "joints"])));
     }
     let mut found = Prediction { samples: samples.len(), ..Prediction::default() };
     let (mut squares, mut variances) = (vec![0.0; joints], vec![0.0; joints]);

@@ -1,6 +1,12 @@
 //! Scattered measurements of a contact torque: what a scan or an imported log hands to the gridization.
 
-use crate::{Error, MAX_AXES, dataset::JointLabel, error, names, random::mix};
+use crate::{
+    Error, MAX_AXES,
+    dataset::JointLabel,
+    error,
+    names::{self, counted},
+    random::mix,
+};
 
 /// Scattered configurations q with the contact torque tau measured at each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,7 +87,8 @@ impl Samples {
             if column.len() != need {
                 let have = column.len();
                 return Err(error!(
-                    "{what} holds {have} numbers where the configurations hold {need}: every sample needs one a joint"
+                    "{what} holds {} where the configurations hold {need}: every sample needs one a joint",
+                    counted(have, ["number", "numbers"])
                 ));
             }
             if let Some(entry) = column.iter().position(|value| !value.is_finite()) {

@@ -25,6 +25,7 @@ use crate::{
     Error, JointVector, error,
     gridize::{Branches, CellReport, Cells, ForceHistory, LeadDirection, Samples},
     input,
+    names::counted,
     ros::{JointStateTable, is_mcap},
 };
 use rows::{ReadRowResult, Row, Rows};
@@ -381,8 +382,8 @@ impl<'a> Import<'a> {
         self.report.samples = self.samples.len();
         if self.samples.is_empty() {
             return Err(error!(
-                "no row was kept: {} rows were read ({}); see torque.keep, torque.still and torque.cell in the mapping",
-                self.report.rows,
+                "no row was kept of {} ({}); see torque.keep, torque.still and torque.cell in the mapping",
+                counted(self.report.rows, ["row", "rows"]),
                 self.report.left_out()
             ));
         }

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     Error, JointVector,
     csv::{Lines, fields},
-    names::escaped,
+    names::{counted, escaped},
 };
 use std::{io::BufRead, path::Path};
 
@@ -131,7 +131,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
             }
         }
         if columns != layout.columns {
-            let message = format!("{columns} columns where {} are expected", layout.columns);
+            let message = format!("{} where {} are expected", counted(columns, ["column", "columns"]), layout.columns);
             return self.refuse(Reason::Columns, message).map(Some);
         }
         if is_absent {

@@ -6,7 +6,7 @@
 //! the order of elimination share most of their paths. So they are solved in blocks, dense over the supernodes that
 //! lie on any path of the block, and two blocks are multiplied over the supernodes that both have.
 
-use super::substitution::Supernodes;
+use super::{outlook, substitution::Supernodes};
 use faer::linalg::{matmul::matmul, triangular_solve::solve_lower_triangular_in_place};
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
@@ -31,8 +31,11 @@ struct Block<'c> {
 pub(super) fn condense(supernodes: &Supernodes, values: &[f64], columns: &[Vec<(usize, f64)>]) -> Vec<f64> {
     let mut numbers: Vec<usize> = (0..columns.len()).collect();
     numbers.sort_by_key(|&number| columns[number].first().map(|(row, _)| *row));
-    let blocks: Vec<Block<'_>> =
-        numbers.par_chunks(COLUMNS_PER_BLOCK).map(|some| Block::solve(supernodes, values, columns, some)).collect();
+    let path = |some: &[usize]| path(supernodes, some.iter().flat_map(|&column| &columns[column]));
+    let paths: Vec<Vec<usize>> = numbers.par_chunks(COLUMNS_PER_BLOCK).map(path).collect();
+    announce(supernodes, numbers.chunks(COLUMNS_PER_BLOCK).zip(&paths));
+    let solve = |(some, path)| Block::solve(supernodes, values, columns, some, path);
+    let blocks: Vec<Block<'_>> = numbers.par_chunks(COLUMNS_PER_BLOCK).zip(paths).map(solve).collect();
     let order = columns.len();
     let mut entries = vec![0.0; order * order];
     for (k, block) in blocks.iter().enumerate() {
@@ -49,17 +52,43 @@ pub(super) fn condense(supernodes: &Supernodes, values: &[f64], columns: &[Vec<(
     entries
 }
 
-impl<'c> Block<'c> {
-    /// Solves L Y = R for some columns.
-    fn solve(all: &Supernodes, values: &[f64], right: &[Vec<(usize, f64)>], columns: &'c [usize]) -> Self {
-        let mut on_path = BTreeSet::new();
-        for &(row, _) in columns.iter().flat_map(|&column| &right[column]) {
-            let mut next = Some(all.with(row));
-            while let Some(s) = next.filter(|s| on_path.insert(*s)) {
-                next = all.parent(s);
-            }
+/// Supernodes on the paths of `entries` to the root, ascending.
+fn path<'e>(all: &Supernodes, entries: impl Iterator<Item = &'e (usize, f64)>) -> Vec<usize> {
+    let mut on_path = BTreeSet::new();
+    for &(row, _) in entries {
+        let mut next = Some(all.with(row));
+        while let Some(s) = next.filter(|s| on_path.insert(*s)) {
+            next = all.parent(s);
         }
-        let supernodes: Vec<usize> = on_path.into_iter().collect();
+    }
+    on_path.into_iter().collect()
+}
+
+/// Says how long blocks of columns take that have these supernodes.
+fn announce<'b>(all: &Supernodes, blocks: impl Iterator<Item = (&'b [usize], &'b Vec<usize>)>) {
+    let (mut sharing, mut order) = (vec![0.0; all.count()], 0);
+    for (columns, path) in blocks {
+        path.iter().for_each(|&s| sharing[s] += columns.len() as f64);
+        order += columns.len();
+    }
+    let operations = sharing.iter().enumerate().map(|(s, columns)| {
+        let [width, below] = [all.columns(s).len(), all.pattern(s).len()].map(|count| count as f64);
+        // Substitution, and half of the products of all columns that have this supernode.
+        columns * width * (width + 2.0 * below + columns)
+    });
+    let what = format_args!("finding the object's compliance, a matrix of {order} rows,");
+    outlook::announce(what, operations.sum(), rayon::current_num_threads());
+}
+
+impl<'c> Block<'c> {
+    /// Solves L Y = R for some columns, which have these supernodes.
+    fn solve(
+        all: &Supernodes,
+        values: &[f64],
+        right: &[Vec<(usize, f64)>],
+        columns: &'c [usize],
+        supernodes: Vec<usize>,
+    ) -> Self {
         let mut starts = vec![0];
         for (k, &s) in supernodes.iter().enumerate() {
             starts.push(starts[k] + all.columns(s).len());

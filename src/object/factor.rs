@@ -12,6 +12,7 @@
 use super::{
     Stiffness,
     condensation::condense,
+    outlook,
     substitution::{Partition, Supernodes, substitute},
 };
 use crate::{Error, ErrorKind, error, memory};
@@ -82,6 +83,10 @@ impl Factor {
         let mut values = Vec::new();
         values.try_reserve_exact(symbolic.len_val()).map_err(|error| resources(&error))?;
         values.resize(symbolic.len_val(), 0.0);
+        let operations = (0..supernodes.count())
+            .map(|s| outlook::factorisation(supernodes.columns(s).len(), supernodes.pattern(s).len()));
+        let rows = order.len();
+        outlook::announce(format_args!("factorising the object's matrix of {rows} rows"), operations.sum(), 1);
         let mut scratch = MemBuffer::try_new(scratch).map_err(|_| resources(&"out of memory"))?;
         let outcome = symbolic.factorize_numeric_llt(
             &mut values,

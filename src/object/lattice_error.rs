@@ -23,6 +23,10 @@ const INDEX: f64 = 3.0 / (COARSER * COARSER - 1.0);
 /// which such a surface is fine enough (`docs/solids.md`).
 const RADIUS: f64 = 3.0;
 
+/// Places at which they are put under it (1), of which the median counts: at a single one, two lattices may agree by
+/// chance, and another lattice would choose another.
+const PLACES: usize = 15;
+
 /// Error from which on a warning is due (1): Young's modulus of tissue is hardly known better.
 const LARGE: f64 = 0.05;
 
@@ -43,6 +47,12 @@ impl LatticeError {
     #[must_use]
     pub fn is_coarse(&self) -> bool {
         self.relative > LARGE || self.suitable.is_some()
+    }
+
+    /// The warning of coarse cubes, where they are.
+    #[must_use]
+    pub fn warning(&self) -> Option<String> {
+        self.is_coarse().then(|| format!("the lattice is coarse: {self}"))
     }
 }
 
@@ -68,8 +78,8 @@ impl fmt::Display for LatticeError {
 }
 
 impl Object {
-    /// Estimates by how much the lattice in this object errs under a pressure around a typical node
-    /// of `compliance`, that of median softness: on corners errors are greater, and contact is rare. None if no lattice
+    /// Estimates by how much the lattice in this object errs under a pressure around a node of `compliance`: the median
+    /// over nodes from the stiffest to the softest. On corners errors are greater, and contact is rare. None if no lattice
     /// fills it, or if the coarser one is refused, as where it misses an inclusion.
     #[must_use]
     pub fn lattice_error(&self, compliance: &Compliance) -> Option<LatticeError> {
@@ -78,39 +88,56 @@ impl Object {
         let trace = |i: usize| (0..3).map(|k| compliance.block(i, i).col(k)[k]).sum::<f64>();
         let mut places: Vec<usize> = (0..compliance.nodes.len()).collect();
         places.sort_by(|&i, &j| trace(i).total_cmp(&trace(j)));
-        let typical = *places.get(places.len() / 2)?;
-        let edge = topology::mean_edge(&self.rest, &self.triangles);
-        let node = compliance.nodes[typical];
-        let key = [&self.key[..], b"error of the lattice", &node.to_le_bytes()].concat();
+        if places.is_empty() {
+            return None;
+        }
+        let mut nodes: Vec<u32> =
+            (0..PLACES).map(|k| compliance.nodes[places[(2 * k + 1) * places.len() / (2 * PLACES)]]).collect();
+        nodes.dedup();
+        let key = [&self.key[..], b"error of the lattice", bytemuck::cast_slice(&nodes)].concat();
         let kept = Cache::used().and_then(|cache| cache.find(&key));
         let kept = kept.and_then(|bytes| Some(f64::from_le_bytes(bytes.try_into().ok()?)));
         let relative = kept.or_else(|| {
-            let relative =
-                self.relative_error(elastic, COARSER * cell, &self.pressure(node as usize, RADIUS * edge))?;
+            let relative = self.relative_error(elastic, COARSER * cell, &nodes)?;
             Cache::used().into_iter().for_each(|cache| cache.keep(&key, &relative.to_le_bytes()));
             Some(relative)
         })?;
         Some(LatticeError { cell, relative, suitable: self.suitable_cell })
     }
 
-    /// The same from the work of `forces` on cubes of the size `coarser` (m), relative to the compliance (1).
-    fn relative_error(&self, elastic: &ElasticSpec, coarser: f64, forces: &[DVec3]) -> Option<f64> {
+    /// The same around `nodes`, from cubes of the size `coarser` (m), relative to the compliance (1).
+    fn relative_error(&self, elastic: &ElasticSpec, coarser: f64, nodes: &[u32]) -> Option<f64> {
         let material = Material::Elastic(ElasticSpec { cell: Some(coarser), ..elastic.clone() });
         let coarser = ObjectSpec { material, ..self.spec.clone() };
         let coarser = Self::from_surface(&coarser, self.rest.clone(), self.triangles.clone()).ok()?;
-        let [coarser, own] = [&coarser, self].map(|object| object.work(forces).ok());
-        Some(INDEX * (coarser? / own? - 1.0).abs())
+        let radius = RADIUS * topology::mean_edge(&self.rest, &self.triangles);
+        let error = |&node: &u32| {
+            let forces = self.pressure(node as usize, radius);
+            let [coarser, own] = [&coarser, self].map(|object| object.work(&forces).ok());
+            Some(INDEX * (coarser? / own? - 1.0).abs())
+        };
+        let mut errors = nodes.iter().map(error).collect::<Option<Vec<f64>>>()?;
+        errors.sort_unstable_by(f64::total_cmp);
+        Some(errors[errors.len() / 2])
     }
 
-    /// Forces on the surface's nodes of the pressure `(1 - r^2/a^2)^2` around `node`, `a` being `radius` (m).
+    /// Forces on the surface's nodes of the pressure `(1 - r^2/a^2)^2` around `node`, a being `radius` (m), on the side
+    /// that faces as `node` does: all around a body smaller than that, pressure would only squeeze it.
     fn pressure(&self, node: usize, radius: f64) -> Vec<DVec3> {
         let middle = self.rest[node];
+        let corners = |triangle: &[u32; 3]| triangle.map(|node| self.rest[node as usize]);
+        let area = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+        let own = self.triangles.iter().filter(|triangle| triangle.contains(&(node as u32)));
+        let outward: DVec3 = own.map(|triangle| area(corners(triangle))).sum();
         let mut forces = vec![DVec3::ZERO; self.surface_nodes];
         for triangle in &self.triangles {
-            let [a, b, c] = triangle.map(|node| self.rest[node as usize]);
+            let area = area(corners(triangle));
+            if area.dot(outward) <= 0.0 {
+                continue;
+            }
             for &node in triangle {
                 let squared = self.rest[node as usize].distance_squared(middle) / (radius * radius);
-                forces[node as usize] -= (1.0 - squared).max(0.0).powi(2) * (b - a).cross(c - a);
+                forces[node as usize] -= (1.0 - squared).max(0.0).powi(2) * area;
             }
         }
         forces

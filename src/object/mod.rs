@@ -24,6 +24,7 @@ mod level;
 mod mechanics;
 mod mesh_summary;
 mod ordering;
+mod outlook;
 mod refine;
 mod settled;
 mod skin;
@@ -175,6 +176,8 @@ impl Object {
         let surface = topology::close(&body.nodes[..body.surface_nodes], &mut body.triangles)
             .map_err(|defect| refused(spec, &defect))?;
         warnings.extend(surface.warnings);
+        // Before the work that may be in vain.
+        warnings.iter().for_each(|warning| log::warn!("{warning}"));
         let is_solid = !body.tetrahedra.is_empty() || matches!(spec.material, Material::Elastic(_));
         let held_everywhere = spec.skin.is_some_and(|skin| skin.foundation > 0.0);
         if !is_solid && !held_everywhere {

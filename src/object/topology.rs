@@ -9,6 +9,7 @@
 //! cross or touch are refused (see [`super::crossing`]), so one node decides for a whole part which others surround it.
 
 use super::crossing;
+use crate::names::counted;
 use glam::DVec3;
 use std::{collections::HashMap, f64::consts::PI};
 
@@ -289,10 +290,16 @@ fn turn_outward(
     }
     if total_turned > 0 {
         let all = triangles.len();
-        warnings.push(format!("{total_turned} of {all} triangles of the surface faced the material and were turned"));
+        warnings.push(format!(
+            "of {all} triangles of the surface {} turned, which faced the material",
+            counted(total_turned, ["was", "were"])
+        ));
     }
     if cavities > 0 {
-        warnings.push(format!("{cavities} closed shells lie inside others and are taken as the walls of cavities"));
+        warnings.push(format!(
+            "{} inside others and taken as walls of cavities",
+            counted(cavities, ["closed shell lies", "closed shells lie"])
+        ));
     }
     Ok(())
 }

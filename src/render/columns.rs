@@ -1,7 +1,7 @@
 //! The columns of the tables that hold ticks: the trace, which is written, and the recording, which is also read.
 
 use super::trace::Tick;
-use crate::{JointVector, csv::Table, dataset::JointLabel, field::Flags};
+use crate::{JointVector, csv::Table, dataset::JointLabel, field::Flags, names::counted};
 use std::io::{self, Write};
 
 /// A column of a table of ticks, or one column for each joint: its name, with its unit unless that is a joint's, and
@@ -134,7 +134,7 @@ pub(super) fn read_vector(fields: &[&str], joints: usize) -> Result<JointVector,
         return Ok(JointVector::zeros(0));
     }
     if fields.len() != joints {
-        return Err(format!("{} coordinates", fields.len()));
+        return Err(counted(fields.len(), ["coordinate", "coordinates"]));
     }
     let mut vector = JointVector::zeros(joints);
     for (value, field) in vector.iter_mut().zip(fields) {

@@ -28,6 +28,7 @@ use super::{
 use crate::{
     Error, JointVector, error,
     field::{Sample, range::HaptizedRange},
+    names::counted,
     scene::HapticsSpec,
 };
 
@@ -129,7 +130,8 @@ impl Haptics {
         if gains != source.joints() || npmi.joints() != source.joints() {
             let (field, proxy) = (source.joints(), npmi.joints());
             return Err(error!(
-                "the dataset has {field} joints, the proxy {proxy}, and the haptic gains are for {gains}: they must agree"
+                "the dataset has {}, the proxy {proxy}, and the haptic gains are for {gains}: they must agree",
+                counted(field, ["joint", "joints"])
             ));
         }
         let period = 1.0 / spec.rate;

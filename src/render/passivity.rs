@@ -13,7 +13,7 @@
 //!   Niemeyer, Barbagli and Salisbury 2006; Abbott and Okamura 2005).
 
 use super::source::TorqueSource;
-use crate::{JointVector, dataset::JointLabel, scene::HapticsSpec};
+use crate::{JointVector, dataset::JointLabel, names::counted, scene::HapticsSpec};
 use serde::Serialize;
 
 /// A gain and its passivity bound. Beyond it the loop runs, and may create energy.
@@ -140,8 +140,7 @@ pub fn advice(spec: &HapticsSpec, source: &TorqueSource, bounds: &[Bound]) -> Op
     let worst = exceeded().max_by(|a, b| (a.value / a.safe).total_cmp(&(b.value / b.safe)))?;
     let others = match exceeded().count() - 1 {
         0 => String::new(),
-        1 => ", and 1 gain more".into(),
-        count => format!(", and {count} gains more"),
+        count => format!(", and {} more", counted(count, ["gain", "gains"])),
     };
     let joints = source.joints();
     let passive = passive(spec, source);

@@ -22,6 +22,7 @@ use crate::{
     csv::{Lines, Table},
     dataset::JointLabel,
     device::{Applied, Device, Reading},
+    names::counted,
 };
 use std::{
     io::{self, Write},
@@ -92,7 +93,9 @@ impl Recording {
         let mut lines = Lines::open(file, GREATEST_FILE, REMEDY)?;
         let mut recording = Self::default();
         let (mut line, mut header) = (Vec::new(), false);
-        let wrong = |lines: &Lines<_>, what| lines.error(format!("{what}; {REMEDY} for a proxy of {joints} joints"));
+        let wrong = |lines: &Lines<_>, what| {
+            lines.error(format!("{what}; {REMEDY} for a proxy of {}", counted(joints, ["joint", "joints"])))
+        };
         while let Some(text) = lines.next_text(&mut line)? {
             let bad = |what: String| wrong(&lines, what);
             let text = text.trim();
@@ -109,8 +112,11 @@ impl Recording {
             }
         }
         if recording.start.len() != joints || recording.ticks.is_empty() {
-            let what =
-                format!("{} ticks and a first position of {} joints", recording.ticks.len(), recording.start.len());
+            let what = format!(
+                "{} and a first position of {}",
+                counted(recording.ticks.len(), ["tick", "ticks"]),
+                counted(recording.start.len(), ["joint", "joints"])
+            );
             return Err(wrong(&lines, what));
         }
         Ok(recording)
@@ -199,7 +205,7 @@ fn row(text: &str, joints: usize) -> Result<Tick, String> {
     let whole = width(RECORDED, joints);
     let without_held = fields.len() + joints == whole;
     if fields.len() != whole && !without_held {
-        return Err(format!("{} fields in the place of {whole}", fields.len()));
+        return Err(format!("{} in the place of {whole}", counted(fields.len(), ["field", "fields"])));
     }
     let known = &RECORDED[..RECORDED.len() - usize::from(without_held)];
     read(known, &fields, joints, &mut tick)?;

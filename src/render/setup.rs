@@ -19,6 +19,7 @@ use crate::{
     device::{Motion, SimulatedHand},
     error,
     field::{TorqueField, range::HaptizedRange},
+    names::counted,
     object::Object,
     proxy::Chain,
     scene::{
@@ -87,7 +88,9 @@ impl Setup {
         let (grid, joints) = (dataset.grid.joints(), chain.joints.len());
         if grid != joints {
             return Err(error!(
-                "the dataset's grid has {grid} axes and the proxy of its scene {joints} joints: bake it again"
+                "the dataset's grid has {} and the proxy of its scene {}: bake it again",
+                counted(grid, ["axis", "axes"]),
+                counted(joints, ["joint", "joints"])
             ));
         }
         dataset.check_scene().map_err(|what| error!("the dataset contradicts itself: {what}: bake it again"))?;

@@ -2,10 +2,13 @@
 
 use super::{Arm, ArmJoint, ContactNodes, Robot};
 use super::{practice::Practice, shape};
-use crate::proxy::{Chain, Press};
 use crate::scene::{JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
 use crate::toml_text::{coarse, comment, entry, heading, list, number, significant, vector};
 use crate::{Error, MAX_AXES};
+use crate::{
+    names::counted,
+    proxy::{Chain, Press},
+};
 use glam::DVec3;
 use std::fmt::Write;
 
@@ -134,7 +137,11 @@ fn write_head(text: &mut String, robot: &Robot, arm: &Arm, joints: usize, comman
     writeln!(
         text,
         "# {}",
-        comment(&format!("Arm of {joints} joints of the robot {:?}, taken from {file} by", robot.name))
+        comment(&format!(
+            "Arm of {} of the robot {:?}, taken from {file} by",
+            counted(joints, ["joint", "joints"]),
+            robot.name
+        ))
     )?;
     writeln!(text, "#     {}", comment(command))?;
     writeln!(

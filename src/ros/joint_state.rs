@@ -4,7 +4,7 @@ use super::{
     cdr::{Decoder, Encoder},
     message::{Message, NANOSECONDS, header},
 };
-use crate::names;
+use crate::{names, names::counted};
 use std::collections::HashSet;
 
 /// State of some joints at an instant. Each of the three lists is empty or has one number for each name.
@@ -82,11 +82,17 @@ impl JointState {
             let remedy = "give each joint a name of its own where they are published";
             return Err(format!("the name \"{twice}\" stands twice in it: {remedy}"));
         }
-        for (what, values) in
-            [("positions", &state.position), ("velocities", &state.velocity), ("efforts", &state.effort)]
-        {
+        for (what, values) in [
+            (["position", "positions"], &state.position),
+            (["velocity", "velocities"], &state.velocity),
+            (["effort", "efforts"], &state.effort),
+        ] {
             if !values.is_empty() && values.len() != state.names.len() {
-                return Err(format!("{} {what} for {} names", values.len(), state.names.len()));
+                return Err(format!(
+                    "{} for {}",
+                    counted(values.len(), what),
+                    counted(state.names.len(), ["name", "names"])
+                ));
             }
         }
         Ok(state)
@@ -180,7 +186,7 @@ mod tests {
             }
         }
         let odd = JointState { effort: vec![1.0], ..golden() };
-        assert!(JointState::decode(&odd.encode()).unwrap_err().contains("1 efforts for 2 names"));
+        assert!(JointState::decode(&odd.encode()).unwrap_err().contains("1 effort for 2 names"));
         let twice = JointState { names: vec!["a".into(), "b".into(), "a".into()], ..JointState::default() };
         assert!(JointState::decode(&twice.encode()).unwrap_err().contains("\"a\" stands twice"));
         for name in ["a\nb", "a\u{2028}", "\u{202e}a"] {

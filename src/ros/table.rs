@@ -6,7 +6,7 @@
 //! zero, the time at which it was logged.
 
 use super::{JointState, MOST_JOINTS, TYPE, messages::Messages};
-use crate::{Error, csv::plain, input};
+use crate::{Error, csv::plain, input, names::counted};
 use std::{
     collections::BTreeMap,
     fmt::Write as _,
@@ -121,7 +121,7 @@ impl JointStateTable {
         }
         if !has_effort {
             let what = format!(
-                "none of the {messages} messages of {topic} gives an effort, and a torque is made of it: record from a \
+                "no message of {topic} gives an effort, of {messages} in all, and a torque is made of it: record from a \
                  driver that publishes efforts"
             );
             return Err(Error::at(path, what));
@@ -206,8 +206,10 @@ pub(super) fn no_state(path: &Path, topic: &str, number: u64, what: &str) -> Err
 /// Returns which of the `topics` of the file at `path` to read: `topic`, or the only one.
 pub(super) fn chosen(path: &Path, topics: &[Topic], topic: Option<&str>) -> Result<String, Error> {
     let wrong = |what: &str| {
-        let listed: Vec<String> =
-            topics.iter().map(|topic| format!("{} ({} messages)", topic.name, topic.messages)).collect();
+        let listed: Vec<String> = topics
+            .iter()
+            .map(|topic| format!("{} ({})", topic.name, counted(topic.messages, ["message", "messages"])))
+            .collect();
         let topics = if listed.is_empty() { "none".to_owned() } else { listed.join(", ") };
         Error::at(path, format_args!("{what}; its topics of joint states: {topics}"))
     };

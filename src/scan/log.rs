@@ -12,6 +12,7 @@ use crate::{
     dataset::JointLabel,
     gridize::{ForceHistory, Samples},
     input,
+    names::counted,
 };
 use std::{
     fmt::Write as _,
@@ -354,7 +355,7 @@ fn row(line: &str, joints: usize) -> Result<ScanRow, String> {
     let fields: Vec<&str> = line.split(',').collect();
     let columns = 3 * joints + 4;
     if fields.len() != columns {
-        return Err(format!("{} columns where {columns} are expected", fields.len()));
+        return Err(format!("{} where {columns} are expected", counted(fields.len(), ["column", "columns"])));
     }
     let number = |column: usize| {
         let value: Option<f64> = fields[column].parse().ok();

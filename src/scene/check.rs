@@ -2,7 +2,7 @@
 
 use super::value::KEY;
 use super::{JointKind, JointSpec, ProxySpec};
-use crate::{Error, ErrorKind, JointVector};
+use crate::{Error, ErrorKind, JointVector, names::counted};
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
 use std::ops::Range;
@@ -110,7 +110,14 @@ impl Checker<'_> {
         } else if found == needed {
             return Ok(());
         } else if found > 1 || self.text[find(self.text, path).0].starts_with('[') {
-            return Err(self.at(path, format!("{key} lists {found} numbers for {needed} joints")));
+            return Err(self.at(
+                path,
+                format!(
+                    "{key} lists {} for {}",
+                    counted(found, ["number", "numbers"]),
+                    counted(needed, ["joint", "joints"])
+                ),
+            ));
         } else if joints.iter().any(|joint| joint.kind != joints[0].kind) {
             let message = format!(
                 "{key} needs a list of {needed} numbers, one per joint: its unit differs between revolute and \

@@ -3,8 +3,8 @@
 use super::ProxySpec;
 use super::check::Checker;
 use super::value::{KEY, Range, coordinates, not_negative, positive};
-use crate::Error;
 use crate::JointVector;
+use crate::{Error, names::counted};
 use serde::de::{Deserialize, Deserializer, Error as _};
 
 /// How the coordinates of a real device become those of the scene, and how its tip holds the arm. Which device it is,
@@ -66,9 +66,9 @@ fn square<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Vec<JointVector>
     match rows.iter().find(|row| row.len() != rows.len()) {
         None => Ok(Some(rows)),
         Some(row) => Err(D::Error::custom(format!(
-            "{KEY}has {} rows, one of them of {} numbers: it must be square",
-            rows.len(),
-            row.len()
+            "{KEY}has {}, one of them of {}: it must be square",
+            counted(rows.len(), ["row", "rows"]),
+            counted(row.len(), ["number", "numbers"])
         ))),
     }
 }

@@ -2,7 +2,7 @@
 //! scene.
 
 use super::{BOUNDARY_SLOPE, HapticsSpec, JointKind, LEVER_ARM};
-use crate::{Error, JointVector, error};
+use crate::{Error, JointVector, error, names::counted};
 use Quantity::{Gain, Speed, Torque};
 
 /// How a default changes from joints that turn to joints that slide, by a lever arm of 0.1 m.
@@ -69,7 +69,11 @@ impl HapticsSpec {
         let (gains, found) = (list(self), values.len());
         let joints = gains.len();
         if found != 1 && found != joints {
-            return Err(error!("{key} has {found} numbers: give one for all joints, or one for each of the {joints}"));
+            return Err(error!(
+                "{key} has {}: give one for all joints, or one for each of {}",
+                counted(found, ["number", "numbers"]),
+                counted(joints, ["joint", "joints"])
+            ));
         }
         let is_good = |value: f64| value.is_finite() && (value > 0.0 || (zero && value == 0.0));
         if let Some(&value) = values.iter().find(|value| !is_good(**value)) {

@@ -6,8 +6,8 @@
 use super::JointSpec;
 use super::check::Checker;
 use super::value::{count, finite, positive};
-use crate::Error;
 use crate::MAX_AXES;
+use crate::{Error, names::counted};
 use serde::Deserialize;
 
 /// How far beyond an end a grid line may lie and still count, in steps (1): spacings such as pi/60 are written with a
@@ -83,7 +83,11 @@ impl GridTable {
                 joints.iter().map(axis).collect()
             }
             (Some(axes), _) if axes.len() != joints.len() => {
-                let message = format!("the grid has {} axes for {} joints", axes.len(), joints.len());
+                let message = format!(
+                    "the grid has {} for {}",
+                    counted(axes.len(), ["axis", "axes"]),
+                    counted(joints.len(), ["joint", "joints"])
+                );
                 return Err(checker.at(&format!("{path}.axes"), message));
             }
             (Some(axes), spacing) => {

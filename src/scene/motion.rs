@@ -3,8 +3,8 @@
 use super::JointSpec;
 use super::check::Checker;
 use super::value::{KEY, coordinates, not_negative};
-use crate::Error;
 use crate::JointVector;
+use crate::{Error, names::counted};
 use serde::de::{Deserialize, Deserializer, Error as _};
 
 /// Named motions of the hand, as waypoints in C-space.
@@ -47,7 +47,14 @@ impl MotionSpec {
                     _ => {}
                 }
                 if q.len() != joints.len() {
-                    return at("q", format!("q has {} numbers for {} joints", q.len(), joints.len()));
+                    return at(
+                        "q",
+                        format!(
+                            "q has {} for {}",
+                            counted(q.len(), ["number", "numbers"]),
+                            counted(joints.len(), ["joint", "joints"])
+                        ),
+                    );
                 }
                 for (value, JointSpec { name, limits: [least, greatest], .. }) in q.iter().zip(joints) {
                     if !(least..=greatest).contains(&value) {

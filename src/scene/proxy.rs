@@ -5,8 +5,8 @@ use super::check::Checker;
 use super::inertia::positive_semidefinite;
 use super::shape::ShapeTable;
 use super::value::{KEY, Range, count, direction, interval, not_negative, positive, vector};
-use crate::Error;
 use crate::MAX_JOINTS;
+use crate::{Error, names::counted};
 use glam::{DMat3, DVec3};
 use serde::de::{Deserialize, Deserializer, Error as _};
 
@@ -165,9 +165,9 @@ fn inertia<'de, D: Deserializer<'de>>(value: D) -> Result<DMat3, D::Error> {
         [xx, yy, zz, xy, xz, yz] => [xx, yy, zz, xy, xz, yz],
         _ => {
             return Err(D::Error::custom(format!(
-                "{KEY}has {} numbers: it is a list of three moments [xx, yy, zz], or of moments and products [xx, yy, \
+                "{KEY}has {}: it is a list of three moments [xx, yy, zz], or of moments and products [xx, yy, \
                  zz, xy, xz, yz]",
-                list.len()
+                counted(list.len(), ["number", "numbers"])
             )));
         }
     };

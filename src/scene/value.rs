@@ -1,7 +1,7 @@
 //! Values of a scene file that are checked while they are read: each failure names the key, the value and the range,
 //! and the reader of the file adds the place.
 
-use crate::{JointVector, MAX_JOINTS};
+use crate::{JointVector, MAX_JOINTS, names::counted};
 use glam::{DQuat, DVec3, EulerRot};
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error, SeqAccess, Unexpected, Visitor};
@@ -94,7 +94,9 @@ impl Range {
 
     /// Reads a list of `N` numbers.
     pub fn array<'de, const N: usize, D: Deserializer<'de>>(self, value: D) -> Result<[f64; N], D::Error> {
-        let wrong = |list: Vec<f64>| D::Error::custom(format!("{KEY}has {} numbers: it needs {N}", list.len()));
+        let wrong = |list: Vec<f64>| {
+            D::Error::custom(format!("{KEY}has {}: it needs {N}", counted(list.len(), ["number", "numbers"])))
+        };
         self.list(value)?.try_into().map_err(wrong)
     }
 

@@ -3,7 +3,7 @@
 use super::{BackendChoice, ChosenBackend, Progress, Run, Shard, Sweep, SweepReport};
 use crate::{
     Error, ErrorKind, JointVector, MAX_AXES,
-    contact::Model,
+    contact::{MeshRipple, Model},
     dataset::Dataset,
     object::{Compliance, LatticeError, Object},
     proxy::Chain,
@@ -31,6 +31,17 @@ pub fn build_object(scene: &Scene) -> Result<Object, Error> {
         let line = scene.text.lines().position(|line| line.trim_start_matches([' ', '[']).starts_with("object"));
         Error::on_line(&scene.path, line.map_or(1, |line| line + 1) as u64, source).of(ErrorKind::Scene)
     })
+}
+
+/// Remarks, before `model` is solved, on a mesh that shows through and on coarse cubes. Returns the error of the lattice in
+/// its object, where there is one.
+pub fn remark_on_mesh(model: &Model<'_>) -> Option<LatticeError> {
+    if let Some(remedy) = MeshRipple::new(model).and_then(|ripple| ripple.remedy()) {
+        log::warn!("{remedy}");
+    }
+    let error = model.object.lattice_error(&model.compliance);
+    error.and_then(|error| error.warning()).into_iter().for_each(|warning| log::warn!("{warning}"));
+    error
 }
 
 /// How a scene is haptized.
@@ -125,9 +136,8 @@ impl Bake<'_> {
             }
         }
         sweep.binding.provenance.aim = aim;
-        sweep.lattice = object.lattice_error(&model.compliance);
-        let coarse = sweep.lattice.filter(LatticeError::is_coarse);
-        sweep.warnings.extend(coarse.map(|error| format!("the lattice is coarse: {error}")));
+        sweep.lattice = remark_on_mesh(&model);
+        sweep.warnings.extend(sweep.lattice.and_then(|error| error.warning()));
         let run = Run { chunk: chosen.chunk(), stop, progress };
         work(&mut sweep, &mut chosen, run)
     }

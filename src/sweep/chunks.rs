@@ -254,7 +254,6 @@ impl Course<'_, '_> {
             rate: (tally.points - self.resumed) as f64 / seconds,
             footprint: self.footprint,
             forecast: self.sweep.forecast,
-            mesh_ripple: self.sweep.binding.provenance.mesh_ripple,
         });
     }
 

@@ -7,6 +7,7 @@ use crate::{
     contact::{Model, Solvers, Status},
     error,
     field::check_rows,
+    names::counted,
     object::Object,
     proxy::Chain,
     scene::Scene,
@@ -71,7 +72,11 @@ impl Direct {
     pub fn inspect(&self, q: &[f64]) -> Result<Inspection, Error> {
         let (found, joints) = (q.len(), self.joints());
         if found != joints {
-            return Err(error!("{found} coordinates were given for a proxy of {joints} joints"));
+            return Err(error!(
+                "{} given for a proxy of {}",
+                counted(found, ["coordinate was", "coordinates were"]),
+                counted(joints, ["joint", "joints"])
+            ));
         }
         check_rows(q, joints)?;
         Ok(Inspection::new(self.model(), q))

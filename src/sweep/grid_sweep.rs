@@ -22,6 +22,7 @@ use crate::{
     contact::{MeshRipple, Model},
     dataset::{self, Axis, Dataset, Extras, Grid, Heading, Provenance, Surface},
     error, memory,
+    names::counted,
     object::{LatticeError, Object, Skin},
     scene::{HapticsSpec, Scene},
 };
@@ -47,8 +48,6 @@ pub struct Progress {
     pub footprint: Footprint,
     /// Expected cost of the sweep, if its points were sampled.
     pub forecast: Option<Forecast>,
-    /// How much a contact point feels the mesh, where that was looked at.
-    pub mesh_ripple: Option<MeshRipple>,
 }
 
 /// How a sweep is run; nothing of it changes the result.
@@ -86,6 +85,11 @@ pub struct Sweep<'a> {
     pub(super) proxy_nodes: usize,
 }
 
+/// Says that a grid has other than one axis for each joint.
+fn unlike(axes: usize, joints: usize) -> String {
+    format!("{} for {}", counted(axes, ["axis", "axes"]), counted(joints, ["joint", "joints"]))
+}
+
 /// The grid of `scene`, with the names and units of its joints.
 #[must_use]
 pub fn grid_of(scene: &Scene) -> Grid {
@@ -111,7 +115,7 @@ impl<'a> Sweep<'a> {
         let grid = grid_of(scene);
         check_given(scene)?;
         if grid.joints() != scene.proxy.joints.len() {
-            return Err(in_grid(format_args!("{} axes for {} joints", grid.joints(), scene.proxy.joints.len())));
+            return Err(in_grid(unlike(grid.joints(), scene.proxy.joints.len())));
         }
         grid.check().map_err(in_grid)?;
         let with_forces = scene.graphics.is_some();
@@ -216,7 +220,7 @@ impl<'a> Sweep<'a> {
     fn fitting(&mut self, model: &'a Model<'a>) -> Result<&'a Model<'a>, Error> {
         let joints = model.chain.joints.len();
         if joints != self.binding.grid.joints() {
-            return Err(in_grid(format_args!("{} axes for {joints} joints", self.binding.grid.joints())));
+            return Err(in_grid(unlike(self.binding.grid.joints(), joints)));
         }
         self.binding.shape.extras.tangent = model.with_tangent;
         Ok(model)

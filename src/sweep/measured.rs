@@ -31,6 +31,9 @@ use std::{
 /// time, within these limits. An rms over the fewest is good to a tenth, over the most to a thirtieth.
 const CONFIGURATIONS: Range<usize> = 100..1000;
 
+/// Length of rounding from which on it is proposed, in that of the scene (1): less changes the error by some percent.
+const LONGER: f64 = 1.25;
+
 /// Seed of the random configurations; differs from the pilot's.
 const SEED: u64 = 0x94d0_49bb_1331_11eb;
 
@@ -129,6 +132,7 @@ impl ErrorCheck<'_> {
         error.cut = (!places.is_empty()).then(|| cut_cells(grid, table, &places, &reference));
         error.geometry = self.geometry_error(&reference);
         error.rounding = self.rounding(grid, &places);
+        error.rounded = self.model.contact.round;
         error.friction = reference.friction_excess(self.model);
         let cells = places.par_iter().map(|place| {
             let corners = corners(grid, &place.cell).map(|corner| grid.configuration(corner));
@@ -139,10 +143,10 @@ impl ErrorCheck<'_> {
 
     /// Returns the length over which contact could be rounded: half of what the deepest nodes at `places` move in a step
     /// of `grid`, which is what that resolves, or what the body's thickness allows; none where that is half as much, or
-    /// where contact is rounded or not at rest (m).
+    /// [hardly more](LONGER) than contact is rounded over, or where contact is not at rest (m).
     fn rounding(&self, grid: &Grid, places: &[Place]) -> Option<f64> {
         let contact = self.model.contact;
-        if contact.law != ContactLaw::Rest || contact.round.is_some() || places.is_empty() {
+        if contact.law != ContactLaw::Rest || places.is_empty() {
             return None;
         }
         let moved = |proximity: &mut Proximity<'_>, place: &Place| {
@@ -160,7 +164,7 @@ impl ErrorCheck<'_> {
         moved.sort_unstable_by(f64::total_cmp);
         let resolved = 0.5 * moved[moved.len() / 2];
         let length = resolved.min(self.model.greatest_rounding());
-        (length > 0.5 * resolved).then_some(length)
+        (length > 0.5 * resolved && length > LONGER * contact.round.unwrap_or(0.0)).then_some(length)
     }
 
     /// Returns what contact at rest, of which `reference` has the torques, leaves out; none by another law.

@@ -35,7 +35,7 @@ pub(crate) mod thin_parts;
 mod tile;
 
 pub use crate::contact::Backend;
-pub use bake::{Bake, baked, build_object, sample};
+pub use bake::{Bake, baked, build_object, remark_on_mesh, sample};
 #[cfg(feature = "viewer")]
 pub(crate) use bake::{model_of, sweep_of};
 #[cfg(feature = "viewer")]

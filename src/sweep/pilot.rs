@@ -15,6 +15,7 @@ use crate::{
     dataset::Dataset,
     error,
     field::TorqueField,
+    names::counted,
     proxy::Chain,
     scene::{ContactSpec, EffortNorm, Interpolation, NormUnit, Scene},
 };
@@ -219,6 +220,7 @@ impl Pilot {
             if trials.last().is_some_and(|trial: &Trial| trial.points == points) {
                 continue;
             }
+            log::info!("trying a grid of {}", counted(points, ["point", "points"]));
             let start = Instant::now();
             let bake =
                 Bake { scene: &spaced, backend, measured: Some(0), aim: None, date: "", stop, progress: &mut |_| () };

@@ -167,6 +167,7 @@ impl Reference {
             cut: None,
             geometry: None,
             rounding: None,
+            rounded: None,
             friction: None,
         }
     }

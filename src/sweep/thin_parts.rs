@@ -3,6 +3,7 @@
 use crate::{
     JointVector,
     contact::{Model, PastMiddle, Proximity, Status},
+    names::counted,
     random::Random,
     store::{Place, Store, beyond},
 };
@@ -36,9 +37,10 @@ pub(super) fn notice(
     }
     let consequence = thinnest(&passed)?;
     Some(format!(
-        "near {} of {count} random configurations in contact the arm {consequence}: shorten the ranges of the joints, or \
+        "near {} of {} in contact the arm {consequence}: shorten the ranges of the joints, or \
          make the part thicker",
         passed.len(),
+        counted(count, ["random configuration", "random configurations"])
     ))
 }
 

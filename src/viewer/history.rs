@@ -27,6 +27,8 @@ pub struct History {
     begun: f64,
     /// Whether no tick of this loop was seen yet.
     new: bool,
+    /// Whether the arm was free since the first loop began.
+    was_free: bool,
     cost: Durations,
     jitter: Durations,
     /// The same while the window held still.
@@ -40,7 +42,8 @@ impl History {
     pub fn new(period: f64) -> Option<Self> {
         let [cost, jitter, still] = [Durations::new()?, Durations::new()?, Durations::new()?];
         let ticks = VecDeque::with_capacity(KEPT);
-        Some(Self { ticks, first: 0, period, begun: 0.0, new: true, cost, jitter, still, refused: Vec::new() })
+        let refused = Vec::new();
+        Some(Self { ticks, first: 0, period, begun: 0.0, new: true, was_free: false, cost, jitter, still, refused })
     }
 
     /// Another loop begins, whose time goes on where that of the last one ended.
@@ -77,6 +80,7 @@ impl History {
                 let late = (tick.time - last.time - self.period).abs();
                 jitter(self).record(Duration::from_secs_f64(late));
             }
+            self.was_free |= !tick.sample.contact;
             if self.ticks.len() == KEPT {
                 self.ticks.pop_front();
                 self.first += 1;
@@ -95,6 +99,12 @@ impl History {
     #[must_use]
     pub fn last(&self) -> Option<&Tick> {
         self.ticks.back()
+    }
+
+    /// Whether the arm was free since the session began: only then is it known from which side it met the object.
+    #[must_use]
+    pub fn was_free(&self) -> bool {
+        self.was_free
     }
 
     /// About `count` ticks of the last `seconds`, evenly, always the same ones while time goes on.

@@ -514,7 +514,11 @@ fn felt(ui: &mut Ui, session: &mut Session, touched: Option<usize>) {
     let Some(tick) = session.history.last() else { return };
     let mut contact = contact(tick, touched);
     let held = tick.flags.contains(Flags::HELD);
-    let colour = if held { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+    let began_inside = tick.sample.contact && !session.history.was_free();
+    if began_inside {
+        contact += " since the session began: with the closest surface, from whichever side the arm came";
+    }
+    let colour = if held || began_inside { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
     if held {
         let gains = &session.controls.tuning.haptics;
         contact += &format!(", Kvc {}", border_stiffness(gains, &session.loaded.dataset.grid));

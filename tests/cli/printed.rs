@@ -144,7 +144,7 @@ const COMMANDS: [&[&str]; 38] = [
 const TEXT_APART: [&str; 3] = ["doctor", "completions", "device list"];
 
 /// How lines begin that depend on how busy the machine is, or hold a hash.
-const UNSTEADY: [&str; 2] = ["  late ", "parts/"];
+const UNSTEADY: [&str; 3] = ["  late ", "  missed ", "parts/"];
 
 /// Objects whose keys are not fixed: names of clamps and reasons.
 const OPEN: [&str; 2] = ["clamped", "halted"];
@@ -169,6 +169,27 @@ fn without_numbers(text: &str) -> String {
         rest = &number[end..];
     }
     masked + rest
+}
+
+/// Returns where `text` counts one of something in the plural: a word that ends in s, or an irregular plural, behind a
+/// one that is neither a part of a number nor a unit's.
+fn ones_in_the_plural(text: &str) -> Vec<String> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let irregular = ["axes", "vertices", "equilibria", "tetrahedra", "histories"];
+    let noun = |word: &&str| {
+        let word = word.trim_end_matches(|c: char| !c.is_alphanumeric());
+        let is_word = word.len() > 2 && word.chars().all(|c| c.is_ascii_lowercase());
+        is_word && (word.ends_with('s') && !word.ends_with("ss") || irregular.contains(&word))
+    };
+    // "1 grid points", "1 of its rows" is right.
+    let is_plural = |at: usize| {
+        let next = words.get(at + 1);
+        next.is_some_and(|next| noun(next) && !["is", "has", "as", "was", "its"].contains(next))
+            || next.is_some_and(|next| ["grid", "contact", "random", "free", "sampled"].contains(next))
+                && words.get(at + 2).is_some_and(noun)
+    };
+    let ones = (0..words.len()).filter(|&at| words[at].trim_start_matches('(') == "1" && is_plural(at));
+    ones.map(|at| words[at..words.len().min(at + 4)].join(" ")).collect()
 }
 
 /// Returns the keys of `values`, which stand at one place of an object: `{a {b} c [{d}]}`.
@@ -227,6 +248,8 @@ fn commands_print_what_they_always_printed() {
             let lines = without_numbers(&text(&said.stdout).replace(std::env::consts::ARCH, "ARCH"));
             let steady = lines.lines().filter(|line| !UNSTEADY.iter().any(|start| line.starts_with(start)));
             steady.for_each(|line| writeln!(printed, "{line}").unwrap());
+            let plural = [&said.stdout, &said.stderr].map(|said| ones_in_the_plural(&text(said)));
+            assert_eq!(plural, [(); 2].map(|()| Vec::<String>::new()), "{arguments:?}");
         }
         writeln!(printed, "json: {}", shape(&[&object])).unwrap();
     }
@@ -236,6 +259,17 @@ fn commands_print_what_they_always_printed() {
     let expected = fs::read_to_string(SNAPSHOT).unwrap();
     let difference = printed.lines().zip(expected.lines()).find(|(now, before)| now != before);
     assert!(printed == expected, "{difference:?}\n{printed}");
+}
+
+#[test]
+fn one_is_found_in_the_plural_alone() {
+    for right in ["1 point, 21 points", "0.1 points", "1 of 2 rows", "1 grid point", "1 has none", "1 mm", "1 loss"] {
+        assert_eq!(ones_in_the_plural(right), Vec::<String>::new());
+    }
+    assert_eq!(
+        ones_in_the_plural("in 1 shards, (1 axes) at 1 grid points"),
+        ["1 shards, (1 axes)", "(1 axes) at 1", "1 grid points"]
+    );
 }
 
 #[test]

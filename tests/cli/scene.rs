@@ -419,7 +419,7 @@ const BROKEN: &[Broken] = &[
     ("spacing = 0.1", "spacing = 5", "[grid]", &["single point"]),
     ("spacing = 0.1", "spacing = 2e-12", "[grid]", &["1.000e12 points", "37000 GB", "widen the spacing"]),
     ("spacing = 0.1", "spacing = 1e-320", "[grid]", &["points"]),
-    ("spacing = 0.1", "axes = []", "axes", &["0 axes for 1 joints"]),
+    ("spacing = 0.1", "axes = []", "axes", &["0 axes for 1 joint"]),
     ("spacing = 0.1", "axes = [{ start = 0 }]", "axes", &["two of"]),
     ("spacing = 0.1", "axes = [{ start = 0, stop = 1, step = 0.1, count = 11 }]", "axes", &["leave one"]),
     ("spacing = 0.1", "axes = [{ start = 0, stop = -1, step = 0.1 }]", "axes", &["upwards"]),
@@ -439,7 +439,7 @@ const BROKEN: &[Broken] = &[
         "spacing = 0.1",
         "spacing = 0.1\n[motion]\npress = [\n{ time = 0, q = [0] },\n{ time = 1, q = [0, 1] }]",
         "{ time = 1",
-        &["q has 2 numbers for 1 joints"],
+        &["q has 2 numbers for 1 joint"],
     ),
     (
         "spacing = 0.1",

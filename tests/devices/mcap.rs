@@ -70,7 +70,7 @@ fn a_topic_is_a_table_whatever_order_its_messages_name_joints_in() {
     assert_eq!(text(&path, Some("/a")).unwrap(), head.to_owned() + expected);
 
     let error = text(&path, None).unwrap_err().to_string();
-    assert!(error.contains("--topic") && error.contains("/a (3 messages), /b (1 messages)"), "{error}");
+    assert!(error.contains("--topic") && error.contains("/a (3 messages), /b (1 message)"), "{error}");
     assert!(text(&path, Some("/c")).unwrap_err().to_string().contains("no topic /c"));
 }
 
@@ -141,7 +141,7 @@ fn joint_states_of_which_no_torque_can_be_made_are_refused_with_the_cause() {
     };
     for effort in [&[][..], &[f64::NAN]] {
         let error = refused(states(effort, |_| "x"), &["x"]);
-        assert!(error.contains("none of the 50 messages of /joint_states gives an effort"), "{error}");
+        assert!(error.contains("no message of /joint_states gives an effort, of 50 in all"), "{error}");
     }
     // Of a topic with several publishers some joints may be chosen, however seldom they are told.
     let states_of_two = states(&[0.5], |k| ["gripper", "gripper", "arm"][k as usize % 3]);

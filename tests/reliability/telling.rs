@@ -300,17 +300,32 @@ fn a_picture_for_which_there_is_no_room_leaves_the_earlier_one() {
     assert!(std::fs::read(home.path().join("x.png")).unwrap() == before);
 }
 
+/// A forgotten scale is known before hours of work are spent on it, and so is a triangle that was turned.
 #[test]
-fn inspect_warns_of_a_mesh_as_bake_does() {
+fn what_is_known_of_a_body_is_said_once_and_before_it_is_solved() {
     let home = home();
     let mesh = std::fs::read_to_string(home.path().join("cube.obj")).unwrap();
     assert!(mesh.contains("f 1 3 4 2\n"), "a side of the cube, which is turned round");
     std::fs::write(home.path().join("cube.obj"), mesh.replace("f 1 3 4 2\n", "f 2 4 3 1\n")).unwrap();
-    let warning = |output: Output| {
-        assert!(output.status.success(), "{}", message(&output));
-        message(&output).lines().find(|line| line.contains("faced the material")).unwrap_or_default().to_owned()
+    let said = |arguments: &[&str]| {
+        let text = message(&run(home.path(), arguments));
+        let lines: Vec<&str> = text.lines().collect();
+        let found: Vec<usize> = (0..lines.len()).filter(|&line| lines[line].contains("faced the material")).collect();
+        assert_eq!(found.len(), 1, "{arguments:?}: {text}");
+        let results = lines.iter().position(|line| line.contains("points") || line.contains("contact along"));
+        assert!(results.is_none_or(|results| found[0] < results), "{arguments:?}: {text}");
+        lines[found[0]].to_owned()
     };
-    let baked = warning(run(home.path(), &["bake", "scene.toml", "-o", "y.haptize", "--backend", "cpu"]));
-    assert!(!baked.is_empty());
-    assert_eq!(warning(run(home.path(), &["inspect", "scene.toml", "--q", "0,0"])), baked);
+    let baked = said(&["bake", "scene.toml", "-o", "y.haptize", "--backend", "cpu"]);
+    for arguments in [
+        &["inspect", "scene.toml", "--q", "0,0"][..],
+        &["bake", "scene.toml", "-o", "z.haptize", "--backend", "cpu", "--max-error", "90%"],
+        &["bake", "scene.toml", "--shard", "0/2", "-o", "shards", "--backend", "cpu"],
+        &["plan", "scene.toml", "--shards", "2"],
+        &["reach", "scene.toml", "--backend", "cpu"],
+        &["play", "scene.toml", "--seconds", "0.01"],
+        &["place", "scene.toml"],
+    ] {
+        assert_eq!(said(arguments), baked);
+    }
 }

@@ -85,7 +85,7 @@ fn a_scene_solved_directly_gives_what_its_inspection_and_its_dataset_tell() {
 fn what_is_no_configuration_is_not_solved() {
     let direct = Direct::new(&scene()).unwrap();
     let refused = |q: &[f64]| direct.inspect(q).unwrap_err().to_string();
-    assert!(refused(&[0.0]).contains("1 coordinates were given for a proxy of 2 joints"));
+    assert!(refused(&[0.0]).contains("1 coordinate was given for a proxy of 2 joints"));
     assert!(refused(&[0.0, f64::NAN]).contains("coordinate 1 of configuration 0 is not a finite number"));
     assert!(direct.torques(&[0.0; 3]).is_err());
     assert!(direct.torques(&[f64::INFINITY, 0.0]).is_err());

@@ -68,6 +68,21 @@ fn a_session_without_a_dataset_tells_it_afterwards() {
     assert!(!shallow.contains("the middle of a part"), "{shallow}");
 }
 
+/// An arm that begins within the plate, past its middle, is pushed out on the far side: that is said, of a scene and of a
+/// dataset; and nothing of one that begins in front of it.
+#[test]
+fn a_session_that_begins_in_contact_says_that_the_side_is_not_known() {
+    let folder = folder(0.005, 0.0005);
+    std::fs::write(folder.0.path().join("inside.csv"), "time,press\n0,0.0004\n0.3,-0.004\n").unwrap();
+    printed(&folder, &["bake", "plate.toml", "--backend", "cpu"]);
+    for file in ["plate.toml", "plate.haptize"] {
+        let [inside, before] = ["inside.csv", "motion.csv"].map(|motion| {
+            printed(&folder, &["play", file, "--motion", motion, "-o", "out"]).contains("begins in contact")
+        });
+        assert!(inside && !before, "{file}: {inside}, {before}");
+    }
+}
+
 #[test]
 fn a_refined_dataset_tells_it_too() {
     let refined = ["bake", "plate.toml", "--backend", "cpu", "--max-error", "60%", "--refine", "2"];

@@ -197,13 +197,19 @@ fn surface(file: &Path, placement: &Placement, mesh: Mesh, is_soup: bool, warnin
     let nodes = weld(nodes, &mut triangles);
     if nodes.len() < count && !is_soup {
         let (file, merged) = (file.display(), count - nodes.len());
-        warnings.push(format!("{file}: {merged} of {count} nodes lay exactly on another and were merged with it"));
+        warnings.push(format!(
+            "{file}: of {count} nodes {} merged with another in exactly the same place",
+            counted(merged, ["was", "were"])
+        ));
     }
     let faces = triangles.len();
     triangles.retain(|[a, b, c]| a != b && b != c && c != a);
     if triangles.len() < faces {
         let (file, dropped) = (file.display(), faces - triangles.len());
-        warnings.push(format!("{file}: {dropped} of {faces} faces had two corners in one place and were left out"));
+        warnings.push(format!(
+            "{file}: of {faces} faces {} left out, with two corners in one place",
+            counted(dropped, ["was", "were"])
+        ));
     }
     (placement.place(nodes), triangles)
 }
@@ -214,7 +220,10 @@ fn solid(file: &Path, placement: &Placement, mesh: Mesh, warnings: &mut Vec<Stri
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra, mesh.mid_nodes);
     if turned > 0 {
         let (file, all) = (file.display(), ordered.tetrahedra.len());
-        warnings.push(format!("{file}: {turned} of {all} tetrahedra were numbered inside out and were turned"));
+        warnings.push(format!(
+            "{file}: of {all} tetrahedra {} turned, numbered inside out",
+            counted(turned, ["was", "were"])
+        ));
     }
     Body { regions: mesh.regions, ..ordered }
 }

@@ -416,7 +416,7 @@ fn a_shell_inside_another_is_the_wall_of_a_cavity_and_one_inside_that_a_body() {
         assert!(sign * part.map(volume).sum::<f64>() > 0.0, "shell {number}");
     }
     assert!(
-        object.warnings.iter().any(|w| w.contains("1 closed shells") && w.contains("cavities")),
+        object.warnings.iter().any(|w| w.contains("1 closed shell lies") && w.contains("cavities")),
         "{:?}",
         object.warnings
     );
