@@ -178,7 +178,7 @@ impl Twin {
         }
         if let Some(lattice) = self.lattice.filter(LatticeError::is_coarse) {
             doubts.push(format!(
-                "the lattice is coarse: cubes of {:.2} mm make its compliance err by an estimated {:.1} %, which the modulus makes \
+                "the lattice is coarse: cubes of {:.2} mm make its compliance err by an estimated {:.1} % at most, which the modulus makes \
                  up for on the whole, and not place by place: find it again with smaller cubes, --cell {:.4}",
                 1e3 * lattice.cell,
                 100.0 * lattice.relative,

@@ -60,7 +60,7 @@ impl fmt::Display for LatticeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "cubes of {:.2} mm make its compliance err by an estimated {:.1} %",
+            "cubes of {:.2} mm make its compliance err by an estimated {:.1} % at most",
             self.cell * 1e3,
             self.relative * 1e2
         )?;

@@ -20,9 +20,11 @@ fn crane() -> String {
     std::fs::read_to_string(file("crane.xml")).unwrap()
 }
 
-/// Configurations (rad, m), and from MuJoCo: the centres of the capsule, the box and the spheres of the left and the
+/// A configuration (rad, m), and from MuJoCo: the centres of the capsule, the box and the spheres of the left and the
 /// right finger (m), and the upper triangle of the inertia without actuators (kg m^2, kg m, kg).
-const CONFIGURATIONS: [([f64; 3], [[f64; 3]; 4], [f64; 6]); 2] = [
+type InMujoco = ([f64; 3], [[f64; 3]; 4], [f64; 6]);
+
+const CONFIGURATIONS: [InMujoco; 2] = [
     (
         [0.4, 0.01, 0.3],
         [

@@ -72,9 +72,12 @@ fn regions_are_read_where_a_format_has_them() {
     assert!(build(&file("text.vtu"), stiff(2)).is_err());
 }
 
+/// A type of cell in Gmsh, the numbers of its orders in VTK, and the corners of the edges and faces that have nodes.
+type InVtk = (&'static Cell, [u64; 3], &'static [[usize; 2]], &'static [[usize; 4]]);
+
 /// VTK's order of nodes, by the corners between which they lie (VTK file formats; vtkTriQuadraticHexahedron.h): its types
 /// of first order, of second order without and with nodes in faces.
-const VTK: [(&Cell, [u64; 3], &[[usize; 2]], &[[usize; 4]]); 4] = [
+const VTK: [InVtk; 4] = [
     (&cells::TETRAHEDRON, [10, 24, 24], &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]], &[]),
     (
         &cells::HEXAHEDRON,
