@@ -16,6 +16,7 @@ use crate::{
         ticks,
     },
     error,
+    names::counted,
     proxy::{Chain, Pose, Triangles, shape_frame, shape_triangles},
     render::{
         graphics::ContactForces,
@@ -100,7 +101,8 @@ pub fn instants_at<'a>(
     let refused = |reason: String| error!("cannot draw the deformed object: {reason}");
     if chain.joints.len() != dataset.grid.joints() {
         let (joints, axes) = (chain.joints.len(), dataset.grid.joints());
-        return Err(refused(format!("the chain has {joints} joints, the dataset {axes}; load both from one scene")));
+        let joints = counted(joints, ["joint", "joints"]);
+        return Err(refused(format!("the chain has {joints}, the dataset {axes}; load both from one scene")));
     }
     if trace.frames.is_empty() {
         return Ok(Vec::new());
@@ -118,7 +120,8 @@ pub fn instants_at<'a>(
             let tick = tick(trace, frame);
             let is_touching = tick.is_some_and(|tick| tick.sample.contact);
             if frame.proxy.len() != chain.joints.len() {
-                return Err(refused(format!("the frame at {} s has {} joints", frame.time, frame.proxy.len())));
+                let joints = counted(frame.proxy.len(), ["joint", "joints"]);
+                return Err(refused(format!("the frame at {} s has {joints}", frame.time)));
             }
             if frame.nodes.len() < surface {
                 return Err(too_few_nodes(frame.time, frame.nodes.len(), surface));

@@ -180,7 +180,9 @@ fn the_contents_list_every_page_of_the_guide() {
 
 #[test]
 fn every_command_of_the_documentation_runs_and_prints_what_is_shown() {
-    let failures: String = pages().par_iter().map(|page| run(page)).collect();
+    // docs/site/build.sh runs those of the gallery.
+    let pages: Vec<PathBuf> = pages().into_iter().filter(|page| !page.ends_with("gallery.md")).collect();
+    let failures: String = pages.par_iter().map(|page| run(page)).collect();
     assert!(failures.is_empty(), "{failures}");
 }
 

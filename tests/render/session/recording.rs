@@ -162,7 +162,7 @@ fn files_that_are_no_recording_are_refused_with_their_line() {
         ("0.001,0.001,0,0,0,1", "0.001,0.001,0,-1,0,1", ":3: \"-1\" is not such a number"),
         ("0.001,0.001,0,0,0,1", "0.001,0.001,0,0,0,", ":3: \"\" is not such a number"),
         ("# start,0,0\n", "", ":2: 1 tick and a first position of 0 joints"),
-        ("# start,0,0\n", "# start,0\n", ":1: 1 coordinates"),
+        ("# start,0,0\n", "# start,0\n", ":1: 1 coordinate"),
         ("0.001,0.001,0,0,0,1,1,1,1,1,1,1,1,1,1\n", "", ":2: 0 ticks"),
     ] {
         assert_eq!(good.matches(old).count(), 1);
