@@ -289,11 +289,8 @@ fn turn_outward(
         total_turned += turned;
     }
     if total_turned > 0 {
-        let all = triangles.len();
-        warnings.push(format!(
-            "of {all} triangles of the surface {} turned, which faced the material",
-            counted(total_turned, ["was", "were"])
-        ));
+        let (all, were) = (triangles.len(), if total_turned == 1 { "was" } else { "were" });
+        warnings.push(format!("{total_turned} of {all} triangles of the surface faced the material and {were} turned"));
     }
     if cavities > 0 {
         warnings.push(format!(
