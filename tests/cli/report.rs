@@ -543,7 +543,7 @@ fn parts_that_do_not_belong_together_are_refused() {
     trace.frames[0].nodes.truncate(5);
     assert!(refusal(&chain, &dataset, &trace).contains("has 5 nodes, the dataset's surface 102"));
     trace.frames[0].proxy = JointVector::zeros(1);
-    assert!(refusal(&chain, &dataset, &trace).contains("has 1 joint,"));
+    assert!(refusal(&chain, &dataset, &trace).ends_with("has 1 joint"));
     dataset.surface = None;
     assert!(report::write_figures(&folder("scanned"), &dataset, Some((&chain, &trace))).is_ok());
 
