@@ -46,7 +46,8 @@ impl<R: BufRead> Lines<R> {
 
     /// An error in the line read last.
     pub fn error(&self, what: impl Display) -> Error {
-        Error::on_line(&self.file, self.number, what)
+        // An empty file ends on its first line.
+        Error::on_line(&self.file, self.number.max(1), what)
     }
 
     /// Reads a line into `line`, without its end and without a byte order mark; none at the end of the text.

@@ -9,6 +9,7 @@ use super::{
 use crate::{
     dataset::{may_be_dataset, replace_file, resolved},
     names::counted,
+    paper::HEADING,
     render::recording::SIGNATURE as SESSION,
     report::page,
     scan::SIGNATURE,
@@ -63,8 +64,8 @@ impl Content {
         let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
         // A text may name haptize, and be the work of a person: a scene, a script.
         let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg") || begins(b"GIF89a"));
-        let page = holds(b".TH haptize")
-            || begins(b"# The paper's")
+        let page = begins(b".ie ") && holds(b".TH haptize")
+            || begins(HEADING.as_bytes())
             || begins(page::OPENING.as_bytes())
             || begins(vtk::OPENING.as_bytes());
         let archive = begins(b"PK") && holds(b"torque.npy");
@@ -92,11 +93,17 @@ pub fn is_mcap(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
 }
 
-/// Whether the first line names columns with units, as in `time [s],gap [m]`.
+/// Whether the first line is that of a table that a command writes: of a session, a dataset, a study, or of positions
+/// alone. What a person has measured, beside a time and positions, is none.
 fn is_table(start: &[u8]) -> bool {
-    let line = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let columns = str::from_utf8(line).unwrap_or_default().split(',');
-    columns.filter(|column| column.contains(" [") && column.trim_end().ends_with(']')).count() > 1
+    let line =
+        str::from_utf8(start.split(|byte| *byte == b'\n').next().unwrap_or_default()).unwrap_or_default().trim_end();
+    let openings = ["time [s],hand ", "time [s],node,", "point (row of the other file", "study,series,setting,"];
+    let is_dataset = line.contains(",status") && (line.contains("],torque ") || line.contains("],force "));
+    let has_position = |column: &str| column.ends_with(" [rad]") || column.ends_with(" [m]");
+    openings.iter().any(|opening| line.starts_with(opening))
+        || is_dataset
+        || line.strip_prefix("time [s],").is_some_and(|joints| joints.split(',').all(has_position))
 }
 
 /// A file that is replaced.
@@ -237,14 +244,14 @@ impl Folder {
         Ok(Self { path: path.to_owned(), files, earlier })
     }
 
-    /// Checks that `output`, which the same command writes, is none of the folder's files and none of the outputs that
-    /// were checked before.
+    /// Checks that `output`, which the same command writes, is neither the folder, nor one of its files, nor an output that
+    /// was checked before.
     ///
     /// # Errors
     /// When it is one of them, which would be written over it.
     pub fn keep_apart(&mut self, output: &Path) -> Result<(), Failure> {
         let output = place(output);
-        if self.files.iter().any(|file| place(file) == output) {
+        if place(&self.path) == output || self.files.iter().any(|file| place(file) == output) {
             let why = "another output of this command is written there, too; name another file";
             return Err(format!("{}: {why}", output.display()).into());
         }
@@ -329,6 +336,35 @@ fn is_same(one: &Path, other: &Path) -> bool {
 mod tests {
     use super::*;
     use std::time::Duration;
+
+    #[test]
+    fn what_a_person_wrote_is_never_taken_for_what_haptize_writes() {
+        for file in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets")).unwrap() {
+            let file = file.unwrap().path();
+            let start = fs::read(&file).unwrap();
+            assert_eq!(Content::of(&start[..start.len().min(START as usize)]), None, "{}", file.display());
+        }
+        for mine in [
+            "#!/usr/bin/env python\n# makes the man page .TH haptize\n",
+            "# The paper's sphere, by me\n",
+            "q_a [rad],q_b [rad],tau_a [N m],tau_b [N m]\n",
+            "time [s],q_a [rad],tau_a [N m]\n",
+        ] {
+            assert_eq!(Content::of(mine.as_bytes()), None, "{mine}");
+        }
+        for ours in [
+            ".ie \\n(.g .ds Aq \\(aq\n.TH haptize-new 1\n",
+            "# The paper's figures and numbers, remade by haptize\n",
+            "time [s],hand a [rad],device a [rad]\n",
+            "time [s],node,x [m],y [m],z [m]\n",
+            "a [rad],lift [m],torque a [N m],force lift [N],energy [J],gap [m],status\r\n",
+            "point (row of the other file from 0),node,force x [N]\n",
+            "study,series,setting,value\n",
+            "time [s],a [rad],lift [m]\n",
+        ] {
+            assert_eq!(Content::of(ours.as_bytes()), Some(Content::Product), "{ours}");
+        }
+    }
 
     #[test]
     fn what_another_command_has_written_meanwhile_is_kept() {

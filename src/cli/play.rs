@@ -452,6 +452,11 @@ fn drive(
 
 /// Replays the session in `file`. Returns its trace, and a line that says that it matched.
 fn replay(setup: &Setup, dataset: &Dataset, file: &Path) -> Result<(Played, String), Failure> {
+    if output::is_mcap(file) {
+        let why = "MCAP holds positions and torques, of which --motion takes the hand's; only a session that was recorded as a \
+                   table can be replayed";
+        return Err(format!("{}: {why}", file.display()).into());
+    }
     let recording = Recording::read(file, setup.chain.joints.len())?;
     let mut graphics = setup.graphics(dataset)?;
     let trace = recording.replay(&setup.haptics, graphics.as_mut(), labels(&dataset.grid))?;

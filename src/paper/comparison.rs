@@ -9,6 +9,9 @@ use crate::{
 use serde::Serialize;
 use std::fmt::{self, Display, Write};
 
+/// First line of the page.
+pub const HEADING: &str = "# The paper's figures and numbers, remade by haptize\n";
+
 /// Significant digits of a number in the table.
 const DIGITS: i32 = 3;
 
@@ -167,10 +170,7 @@ impl Comparison {
     /// The comparison as a page of Markdown.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let mut text = String::from(
-            "# The paper's figures and numbers, remade by haptize\n\n\
-             | Fig. | the paper | ours | file |\n|---|---|---|---|\n",
-        );
+        let mut text = format!("{HEADING}\n| Fig. | the paper | ours | file |\n|---|---|---|---|\n");
         // Writing to a string cannot fail.
         for FigureNote { number, file, paper, ours } in &self.figures {
             let file = if file.is_empty() { String::new() } else { format!("`{file}.png`") };

@@ -13,7 +13,7 @@ mod procedure;
 mod specimen;
 
 pub use backend::{PaperBackend, PaperSolver, baked, haptize};
-pub use comparison::{Comparison, FIGURES, FigureNote, Row, Value};
+pub use comparison::{Comparison, FIGURES, FigureNote, HEADING, Row, Value};
 pub use procedure::procedure;
 pub use specimen::{PressedTwin, hardest, specimen};
 

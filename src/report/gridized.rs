@@ -102,8 +102,9 @@ fn caption(samples: &Samples, dataset: &Dataset, fixed: &[usize], shown: [usize;
         "" => String::new(),
         backend => format!(" ({backend})"),
     };
-    let [samples, inside] = [samples.len(), inside].map(ticks::thousands);
-    let mut text = format!("{samples} samples{from}, {inside} grid points inside the measured region");
+    let [(samples, of_samples), (inside, points)] = [(samples.len(), "sample"), (inside, "grid point")]
+        .map(|(count, noun)| (ticks::thousands(count), if count == 1 { noun.to_owned() } else { format!("{noun}s") }));
+    let mut text = format!("{samples} {of_samples}{from}, {inside} {points} inside the measured region");
     let axes = dataset.grid.axes.iter().enumerate().filter(|(axis, _)| !shown.contains(axis));
     let planes: Vec<String> = axes
         .map(|(axis, of)| {

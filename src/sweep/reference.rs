@@ -6,6 +6,7 @@ use crate::{
     contact::{Equilibrium, Model, NodeTree, Slip, Solvers, Status, exact_dissipation},
     dataset::{FrictionExcess, InterpolationError, MeasuredError},
     error,
+    names::counted,
     random::Random,
     scene::{ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
 };
@@ -105,8 +106,9 @@ impl Reference {
         }
         if reference.in_contact == 0 {
             return Err(error!(
-                "the proxy touches nothing, or contact converges nowhere, at {count} random configurations: give the \
-                 scene's grid a region where the proxy touches the object"
+                "the proxy touches nothing, or contact converges nowhere, at {}: give the scene's grid a region \
+                 where the proxy touches the object",
+                counted(count, ["random configuration", "random configurations"])
             ));
         }
         Ok(reference)

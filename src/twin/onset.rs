@@ -121,7 +121,7 @@ impl Approaches {
         found.onsets = approaches.iter().zip(fits).map(|(approach, (fit, _))| approach.onset(fit, scale)).collect();
         if found.onsets.is_empty() {
             return Err(error!(
-                "no approach of the {} goes from a free row into contact: begin the plan's lines outside the object, and let \
+                "no approach goes from a free row into contact, of {}: begin the plan's lines outside the object, and let \
                  them reach it",
                 lines.len()
             ));

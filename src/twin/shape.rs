@@ -15,7 +15,7 @@ use super::nets;
 use super::onset::Approaches;
 use super::radial::{MOST_VALUES, RadialField};
 use crate::proxy::{Chain, Pose, outer};
-use crate::{Error, error};
+use crate::{Error, error, names::counted};
 use glam::{DMat3, DVec3};
 use std::fmt::Write as _;
 
@@ -117,7 +117,8 @@ impl ScannedShape {
         let onsets = &approaches.onsets;
         if onsets.len() < 4 || 5 * onsets.len() > 2 * MOST_VALUES {
             let most = 2 * MOST_VALUES / 5;
-            return Err(error!("{} onsets make no surface: scan between 4 and {most} approaches", onsets.len()));
+            let found = counted(onsets.len(), ["onset makes", "onsets make"]);
+            return Err(error!("{found} no surface: scan between 4 and {most} approaches"));
         }
         let mut pose = chain.new_pose();
         let mut poses = Vec::with_capacity(onsets.len());

@@ -277,6 +277,7 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
         (["--html", "mine.html", "-o", "again"], "not a table or figure of haptize"),
         (["--html", "a.mcap", "--record", "a.mcap"], "another output of this command"),
         (["--html", "again/trace.csv", "-o", "again"], "another output of this command"),
+        (["--html", "new", "-o", "new"], "another output of this command"),
     ] {
         let output = haptize(folder.path(), &[&["play", "finger.haptize"], &arguments[..]].concat());
         assert!(text(&output.stderr).contains(expected), "{arguments:?}: {}", text(&output.stderr));
@@ -312,6 +313,10 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
         (&["finger.haptize", "--seconds", "nan"], "--seconds"),
         (&["finger.haptize", "--replay", "none.csv"], "none.csv: cannot be read"),
         (&["finger.haptize", "--replay", "nan.csv"], "nan.csv:2: "),
+        (
+            &["finger.haptize", "--replay", "session.mcap"],
+            "session.mcap: MCAP holds positions and torques, of which --motion",
+        ),
         (&["finger.haptize", "--replay", "altered.csv"], "altered.csv: the session differs from tick 1"),
         (&["finger.haptize", "--record", "no/such/folder.csv"], "folder.csv"),
         (&["finger.haptize", "-o", "nan.csv"], "nan.csv"),
