@@ -26,20 +26,12 @@ pub struct JointState {
 
 impl Message for JointState {
     const TYPE: &str = "sensor_msgs/msg/JointState";
-    const SCHEMA: &str = "\
+    const FIELDS: &str = "\
 std_msgs/Header header
 string[] name
 float64[] position
 float64[] velocity
 float64[] effort
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
 ";
 
     fn stamp(&self) -> u64 {

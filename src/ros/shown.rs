@@ -20,37 +20,7 @@ pub struct Transforms {
 
 impl Message for Transforms {
     const TYPE: &str = "tf2_msgs/msg/TFMessage";
-    const SCHEMA: &str = "\
-geometry_msgs/TransformStamped[] transforms
-================================================================================
-MSG: geometry_msgs/TransformStamped
-std_msgs/Header header
-string child_frame_id
-geometry_msgs/Transform transform
-================================================================================
-MSG: geometry_msgs/Transform
-geometry_msgs/Vector3 translation
-geometry_msgs/Quaternion rotation
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-";
+    const FIELDS: &str = "geometry_msgs/TransformStamped[] transforms\n";
 
     fn stamp(&self) -> u64 {
         self.stamp
@@ -108,81 +78,7 @@ pub struct Markers {
 
 impl Message for Markers {
     const TYPE: &str = "visualization_msgs/msg/MarkerArray";
-    const SCHEMA: &str = "\
-visualization_msgs/Marker[] markers
-================================================================================
-MSG: visualization_msgs/Marker
-std_msgs/Header header
-string ns
-int32 id
-int32 type
-int32 action
-geometry_msgs/Pose pose
-geometry_msgs/Vector3 scale
-std_msgs/ColorRGBA color
-builtin_interfaces/Duration lifetime
-bool frame_locked
-geometry_msgs/Point[] points
-std_msgs/ColorRGBA[] colors
-string texture_resource
-sensor_msgs/CompressedImage texture
-visualization_msgs/UVCoordinate[] uv_coordinates
-string text
-string mesh_resource
-visualization_msgs/MeshFile mesh_file
-bool mesh_use_embedded_materials
-================================================================================
-MSG: visualization_msgs/UVCoordinate
-float32 u
-float32 v
-================================================================================
-MSG: visualization_msgs/MeshFile
-string filename
-uint8[] data
-================================================================================
-MSG: sensor_msgs/CompressedImage
-std_msgs/Header header
-string format
-uint8[] data
-================================================================================
-MSG: std_msgs/ColorRGBA
-float32 r
-float32 g
-float32 b
-float32 a
-================================================================================
-MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-================================================================================
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: builtin_interfaces/Duration
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-";
+    const FIELDS: &str = "visualization_msgs/Marker[] markers\n";
 
     fn stamp(&self) -> u64 {
         self.stamp
@@ -232,7 +128,7 @@ pub struct RobotDescription {
 
 impl Message for RobotDescription {
     const TYPE: &str = "std_msgs/msg/String";
-    const SCHEMA: &str = "string data\n";
+    const FIELDS: &str = "string data\n";
 
     fn stamp(&self) -> u64 {
         self.stamp

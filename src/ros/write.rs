@@ -1,6 +1,9 @@
 //! An MCAP file of messages.
 
-use super::{MESSAGE_ENCODING, SCHEMA_ENCODING, message::Message};
+use super::{
+    MESSAGE_ENCODING, SCHEMA_ENCODING,
+    message::{Message, schema},
+};
 use mcap::{
     WriteOptions, Writer,
     records::{MessageHeader, Metadata},
@@ -39,7 +42,7 @@ impl<W: Write> MessageWriter<W> {
     /// # Errors
     /// Those of the file.
     pub fn topic<M: Message>(&mut self, name: &str) -> io::Result<u16> {
-        let schema = self.writer.add_schema(M::TYPE, SCHEMA_ENCODING, M::SCHEMA.as_bytes()).map_err(failed)?;
+        let schema = self.writer.add_schema(M::TYPE, SCHEMA_ENCODING, schema::<M>().as_bytes()).map_err(failed)?;
         self.writer.add_channel(schema, name, MESSAGE_ENCODING, &BTreeMap::new()).map_err(failed)
     }
 
