@@ -1,6 +1,7 @@
 //! Progress on standard error: a bar on a terminal, a line now and then elsewhere.
 
 use super::tell;
+use crate::names::duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     io::{IsTerminal, stderr},
@@ -23,10 +24,19 @@ pub struct Bar {
     begun: AtomicBool,
     /// When the last line was printed; absent on a terminal.
     last_line: Option<Mutex<Instant>>,
+    state: Mutex<State>,
+}
+
+/// What is told beside the steps.
+#[derive(Default)]
+struct State {
+    message: String,
+    /// Time left, where the steps that are done do not tell it (s).
+    left: Option<f64>,
 }
 
 impl Bar {
-    /// Returns a bar of so many `unit`, without a length yet, drawn as `template` says.
+    /// Returns a bar of so many `unit`, without a length yet, drawn as `template` says; its message ends in the time left.
     pub fn new(unit: &'static str, template: &str) -> Self {
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = ProgressBar::hidden().with_style(style);
@@ -37,13 +47,14 @@ impl Bar {
             unit,
             begun: AtomicBool::new(false),
             last_line: (!stderr().is_terminal()).then(|| Mutex::new(Instant::now())),
+            state: Mutex::default(),
         }
     }
 
-    /// Shows `done` of `length` steps, and `message`.
-    pub fn set(&self, done: u64, length: u64, message: String) {
+    /// Shows `done` of `length` steps, and `message`. `left`: time left; none where a step takes as long as another (s).
+    pub fn set(&self, done: u64, length: u64, message: String, left: Option<f64>) {
+        *self.state.lock().unwrap_or_else(PoisonError::into_inner) = State { message, left };
         self.bar.set_length(length);
-        self.bar.set_message(message);
         self.bar.set_position(done);
         self.show();
     }
@@ -70,7 +81,14 @@ impl Bar {
             // What was done before the first step says nothing of the rest.
             self.bar.reset_eta();
         }
+        let State { message, left } = &*self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let left = left.unwrap_or_else(|| self.bar.eta().as_secs_f64());
+        let left = (self.bar.position() > 0).then(|| format!("about {} left", duration(left)));
+        let told: Vec<&str> =
+            [message.as_str()].into_iter().filter(|text| !text.is_empty()).chain(left.as_deref()).collect();
+        let told = told.join(", ");
         let Some(last_line) = &self.last_line else {
+            self.bar.set_message(told);
             if begins {
                 self.bar.set_draw_target(indicatif::ProgressDrawTarget::stderr());
             }
@@ -85,10 +103,7 @@ impl Bar {
             return;
         }
         *last_line = Instant::now();
-        let message = self.bar.message();
-        let message = if message.is_empty() { message } else { format!(", {message}") };
-        let (unit, left) = (self.unit, self.bar.eta().as_secs());
-        tell(format_args!("haptize: {done} of {length} {unit}{message}, about {left} s left"));
+        tell(format_args!("haptize: {done} of {length} {}, {told}", self.unit));
     }
 }
 

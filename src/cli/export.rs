@@ -7,6 +7,7 @@ use super::{
     report::{self, Describe, Report, Text},
 };
 use crate::dataset::{Dataset, Format};
+use clap::ValueEnum;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -34,6 +35,15 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let dataset = Dataset::open(&arguments.dataset)?;
     let beside = || arguments.dataset.with_extension(arguments.format.extension());
     let output = arguments.output.clone().unwrap_or_else(beside);
+    // Programs tell what a file is by its name.
+    let is_of = |format: &&Format| output.extension().is_some_and(|ending| ending == format.extension());
+    if let Some(other) = Format::value_variants().iter().find(is_of).filter(|other| **other != arguments.format) {
+        let (file, ending, wanted) = (output.display(), other.extension(), arguments.format.extension());
+        return Err(format!(
+            "{file} has the name of another format: give --format {ending}, or a file whose name ends in .{wanted}"
+        )
+        .into());
+    }
     let inputs = [arguments.dataset.as_path()];
     let replaced = output::check(&output, Content::Product, inputs)?;
     let beside = arguments.format.beside(&output).filter(|file| file.symlink_metadata().is_ok());

@@ -399,9 +399,9 @@ pub fn scanned(logs: &[PathBuf]) -> Result<Source, Failure> {
 
 fn imported(logs: &[PathBuf], mapping: &Mapping) -> Result<Source, Failure> {
     let total = total_size(logs);
-    let bar = Bar::new("bytes", "{wide_bar} {bytes}/{total_bytes}, {msg}, {eta} left");
+    let bar = Bar::new("bytes", "{wide_bar} {bytes}/{total_bytes}, {msg}");
     let mut progress =
-        |progress: ImportProgress| bar.set(progress.bytes, total, counted(progress.rows, ["row", "rows"]));
+        |progress: ImportProgress| bar.set(progress.bytes, total, counted(progress.rows, ["row", "rows"]), None);
     let imported = import(mapping, logs, &mut progress);
     bar.finish();
     let Imported { samples, branches, histories, report } = imported?;

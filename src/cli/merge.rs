@@ -50,8 +50,8 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         return lacking(&merge, &missing);
     }
     let stop = interrupt::stop_flag();
-    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points");
-    let mut progress = |progress: Progress| bar.set(progress.done as u64, progress.points as u64, String::new());
+    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}");
+    let mut progress = |progress: Progress| bar.set(progress.done as u64, progress.points as u64, String::new(), None);
     let merged = merge.to_file(output, arguments.measure_error, stop, &mut progress);
     bar.finish();
     interrupt::over();

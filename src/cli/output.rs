@@ -93,17 +93,14 @@ pub fn is_mcap(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"))
 }
 
-/// Whether the first line is that of a table that a command writes: of a session, a dataset, a study, or of positions
-/// alone. What a person has measured, beside a time and positions, is none.
+/// Whether the first line is that of a table that a command writes: of a session, a dataset or a study. One of times and
+/// positions alone may be a motion that a person has recorded.
 fn is_table(start: &[u8]) -> bool {
     let line =
         str::from_utf8(start.split(|byte| *byte == b'\n').next().unwrap_or_default()).unwrap_or_default().trim_end();
     let openings = ["time [s],hand ", "time [s],node,", "point (row of the other file", "study,series,setting,"];
     let is_dataset = line.contains(",status") && (line.contains("],torque ") || line.contains("],force "));
-    let has_position = |column: &str| column.ends_with(" [rad]") || column.ends_with(" [m]");
-    openings.iter().any(|opening| line.starts_with(opening))
-        || is_dataset
-        || line.strip_prefix("time [s],").is_some_and(|joints| joints.split(',').all(has_position))
+    is_dataset || openings.iter().any(|opening| line.starts_with(opening))
 }
 
 /// A file that is replaced.

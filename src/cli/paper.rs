@@ -265,7 +265,7 @@ impl Measured {
 /// Scans and gridizes all specimens, side by side.
 fn scan_all(folder: &Path) -> Result<[Measured; 3], Failure> {
     let stop = interrupt::stop_flag();
-    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {eta} left");
+    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}");
     let measure = |specimen: Specimen| specimen.measure(folder, stop, &bar);
     let (bare, (fabric, side)) = rayon::join(|| measure(BARE), || rayon::join(|| measure(FABRIC), || measure(SIDE)));
     bar.finish();

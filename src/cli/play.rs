@@ -210,9 +210,11 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         files.extend(drawn.into_iter().filter(|file| !files.contains(file)).collect::<Vec<_>>());
     }
     if live.is_some() && !trace.ticks.iter().any(|tick| tick.sample.contact) {
-        let what =
-            "the arm never met the object; `haptize place SCENE` says how far it is, and makes a motion that presses";
-        tell(format_args!("haptize: nothing touches: {what}"));
+        let what = match (arguments.seconds, arguments.motion.as_str()) {
+            (Some(_), "press" | "scrape") => "the motion may touch later: leave out --seconds to play it whole",
+            _ => "`haptize place SCENE` says how far the object is, and makes a motion that presses",
+        };
+        tell(format_args!("haptize: nothing touches: the arm has not met the object; {what}"));
     }
     let tally = tally(trace);
     let summary = trace.summary();

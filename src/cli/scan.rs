@@ -86,10 +86,10 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     output::check(&output, Content::Log, [arguments.scene.as_path()])?;
     let stop = if arguments.device.is_some() { interrupt::stop_flag_of_device() } else { interrupt::stop_flag() };
-    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
+    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}");
     let mut progress = |progress: ScanProgress| {
         interrupt::kept();
-        bar.set(progress.done as u64, progress.points as u64, format!("{:.0} s on the rig", progress.time));
+        bar.set(progress.done as u64, progress.points as u64, format!("{:.0} s on the rig", progress.time), None);
     };
     let course = Course { resume: arguments.resume, guided: arguments.guided };
     let result = match &arguments.device {

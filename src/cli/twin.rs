@@ -114,8 +114,8 @@ impl Twinned {
         let around = KnownRange::around(&approaches);
         let first = scene(YOUNG, &around)?;
         let (object, chain) = (Object::build(&first.object)?, Chain::new(&first.proxy));
-        let bar = Bar::new("rows", "{wide_bar} {pos}/{len} rows, {eta} left");
-        let mut progress = |done: usize, rows: usize| bar.set(done as u64, rows as u64, String::new());
+        let bar = Bar::new("rows", "{wide_bar} {pos}/{len} rows, {msg}");
+        let mut progress = |done: usize, rows: usize| bar.set(done as u64, rows as u64, String::new(), None);
         let watched = &mut Watched { stop: interrupt::stop_flag(), progress: &mut progress };
         let rows: Vec<JointVector> = approaches.contact.iter().map(|row| row.q).collect();
         let mut model = Model::reaching(&object, &chain, first.contact, &rows)?;

@@ -8,7 +8,7 @@ use crate::{
     sweep::{BackendChoice, Bake, Bounds, Clearance, Footprint, Forecast, MOST_CONFIGURATIONS, Progress},
 };
 use clap::builder::RangedU64ValueParser;
-use std::time::SystemTime;
+use std::time::{Instant, SystemTime};
 
 /// Reads a number of random configurations at which an error is measured: too large a one is told before hours of work.
 pub fn configurations() -> RangedU64ValueParser<usize> {
@@ -22,21 +22,44 @@ pub fn watched<T, E: Into<Failure>>(
     bake: impl FnOnce(Bake<'_>) -> Result<T, E>,
 ) -> Result<T, Failure> {
     let stop = interrupt::stop_flag();
-    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}, {eta} left");
-    let mut announced = false;
+    let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}");
+    let mut begun = None;
     let mut progress = |progress: Progress| {
-        if !std::mem::replace(&mut announced, true) {
+        let begun = *begun.get_or_insert_with(|| {
             interrupt::kept();
             announce(&progress);
-        }
+            Begun { at: Instant::now(), contact_points: progress.contact_points }
+        });
         let message = format!("{} in contact, {:.0}/s", progress.contact_points, progress.rate);
-        bar.set(progress.done as u64, progress.points as u64, message);
+        bar.set(progress.done as u64, progress.points as u64, message, begun.left(&progress));
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let result = bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop, progress: &mut progress });
     bar.finish();
     interrupt::over();
     result.map_err(Into::into)
+}
+
+/// Where a sweep stood when it was begun or taken up.
+#[derive(Clone, Copy)]
+struct Begun {
+    at: Instant,
+    contact_points: usize,
+}
+
+impl Begun {
+    /// Time left, by the points in contact that are expected: those in free space cost next to nothing, and may come
+    /// first. None where no more are expected, or too few are solved to tell (s).
+    fn left(self, progress: &Progress) -> Option<f64> {
+        let Forecast { contact_fraction, seconds, .. } = progress.forecast?;
+        let expected = (contact_fraction * progress.points as f64) as usize;
+        let left = expected.checked_sub(progress.contact_points).filter(|left| *left > 0)?;
+        let solved = progress.contact_points - self.contact_points;
+        match solved {
+            0 => seconds.map(|seconds| seconds * left as f64 / expected.max(1) as f64),
+            solved => Some(self.at.elapsed().as_secs_f64() * left as f64 / solved as f64),
+        }
+    }
 }
 
 /// What a dataset is that touches nothing, and what to do about it.
@@ -76,15 +99,17 @@ fn announce(progress: &Progress) {
         counted(*points, ["point", "points"]),
         megabytes(memory.most)
     ));
-    let Some(Forecast { contact_fraction, seconds, sampled, .. }) = forecast else { return };
-    let time = seconds.map(|seconds| seconds * points.saturating_sub(*done) as f64 / *points as f64);
-    let time = time.map_or(String::new(), |seconds| {
+    let Some(Forecast { contact_fraction, seconds, after, sampled, .. }) = forecast else { return };
+    let time = seconds.zip(*after).map(|(seconds, after)| {
+        let left = seconds * points.saturating_sub(*done) as f64 / *points as f64;
         format!(
-            ", solved from rest in about {}, without the search for lower equilibria and the measurement of accuracy \
-             that follow: they can take several times as long",
-            duration(seconds)
+            ", solved from rest in about {}, and in at most some {} with the search for lower equilibria and the \
+             measurement of accuracy that follow",
+            duration(left),
+            duration(left + after)
         )
     });
+    let time = time.unwrap_or_default();
     let percent = 100.0 * contact_fraction;
     let digits = if percent < 1.0 { 2 } else { 0 };
     tell(format_args!("haptize: predicted from a sample of {sampled}: {percent:.digits$} % in contact{time}"));

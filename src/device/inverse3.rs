@@ -106,7 +106,7 @@ impl Inverse3 {
             .max_frame_size(Some(LONGEST_MESSAGE));
         let (mut socket, _) = tungstenite::client::client_with_config(format!("ws://{address}/"), stream, Some(config))
             .map_err(|error| format!("{address} is no Haply service: {error}"))?;
-        socket.get_mut().renew();
+        socket.get_mut().renew(PATIENCE);
         let inventory = receive(&mut socket).map_err(|halt| format!("{address}: no inventory: {halt}"))?;
         let chosen = inventory.devices().find(|device| wanted_id.is_none_or(|id| device.id() == id));
         let Some(device) = chosen else {
@@ -155,9 +155,9 @@ struct Timed {
 }
 
 impl Timed {
-    /// Begins an exchange.
-    fn renew(&mut self) {
-        self.due = Instant::now() + PATIENCE;
+    /// From now on `patience` is left.
+    fn renew(&mut self, patience: Duration) {
+        self.due = Instant::now() + patience;
     }
 
     /// Time that is left.
@@ -236,8 +236,7 @@ impl Link {
                 self.seen.ended = Some(halt);
                 self.publish.write(self.seen);
                 // Whether it is heard or not.
-                self.socket.get_mut().renew();
-                let _ = self.socket.send(Message::text(message("", &self.id, Some([0.0; 3]))));
+                let _ = self.send("", Some([0.0; 3]));
                 return;
             }
             session = "";
@@ -251,12 +250,28 @@ impl Link {
         let _ = self.socket.flush();
     }
 
-    /// Sends one message and takes in the state that answers it.
-    fn exchange(&mut self, session: &str, force: Option<[f64; 3]>) -> Result<(), Halt> {
-        self.socket.get_mut().renew();
+    /// Sends one message.
+    fn send(&mut self, session: &str, force: Option<[f64; 3]>) -> Result<(), Halt> {
+        self.socket.get_mut().renew(PATIENCE);
         let message = message(session, &self.id, force);
-        self.socket.send(Message::text(message)).map_err(|_| Halt::Unplugged)?;
-        let frame = receive(&mut self.socket)?;
+        self.socket.send(Message::text(message)).map_err(|_| Halt::Unplugged)
+    }
+
+    /// Sends one message and takes in the state that answers it. A force to which none comes for [`STALE_COMMAND`] is
+    /// taken back before the wait goes on.
+    fn exchange(&mut self, session: &str, force: Option<[f64; 3]>) -> Result<(), Halt> {
+        self.send(session, force)?;
+        let pushes = force.is_some_and(|force| force != [0.0; 3]);
+        if pushes {
+            self.socket.get_mut().renew(STALE_COMMAND);
+        }
+        let mut answer = receive(&mut self.socket);
+        if pushes && answer.is_err() && self.socket.get_mut().left().is_err() {
+            self.send("", Some([0.0; 3]))?;
+            // Each message has a state of its own.
+            answer = receive(&mut self.socket).and_then(|_| receive(&mut self.socket));
+        }
+        let frame = answer?;
         match frame.devices().find(|device| device.id() == self.id) {
             Some(device) => self.seen.take(device),
             None => return Err(Halt::Unplugged),

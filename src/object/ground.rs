@@ -7,8 +7,10 @@
 use super::Stiffness;
 use super::attachment::{Attachment, SurfacePoint};
 use super::solid::Elements;
+use super::topology::at;
 use crate::{
     Error, error,
+    names::counted,
     scene::{GroundNodes, GroundSpec, GroundStiffness},
 };
 use glam::{DMat3, DVec3};
@@ -123,13 +125,14 @@ fn add_element(nodes: &[u32], products: &[f64], k: f64, stiffness: &mut Stiffnes
 
 /// Refuses an object of which a connected part has no grounded node. `components`: nodes of each part; `grounded`: per
 /// node, empty where there is no ground.
-pub(super) fn check_components(components: &[Vec<u32>], grounded: &[bool]) -> Result<(), Error> {
+pub(super) fn check_components(nodes: &[DVec3], components: &[Vec<u32>], grounded: &[bool]) -> Result<(), Error> {
     for part in components {
         if !part.iter().any(|&node| grounded.get(node as usize) == Some(&true)) {
-            let (node, nodes) = (part[0], part.len());
             return Err(error!(
-                "the ground holds no node of the part of {nodes} nodes around node {node}, which would float away: ground \
-                 at least one of its nodes, or give the skin a foundation"
+                "the ground holds no node of the part of {} around {}, which would float away: ground at least one of \
+                 its nodes, or give the skin a foundation",
+                counted(part.len(), ["node", "nodes"]),
+                at(nodes, part[0])
             ));
         }
     }

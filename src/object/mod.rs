@@ -182,7 +182,7 @@ impl Object {
         let held_everywhere = spec.skin.is_some_and(|skin| skin.foundation > 0.0);
         if !is_solid && !held_everywhere {
             let grounded = spec.ground.as_ref().map(|ground| ground::select(ground, &body.nodes)).transpose()?;
-            ground::check_components(&surface.components, grounded.as_deref().unwrap_or_default())?;
+            ground::check_components(&body.nodes, &surface.components, grounded.as_deref().unwrap_or_default())?;
         }
         let (mut spec, mut suitable_cell) = (spec.clone(), None);
         if let Material::Elastic(elastic) = &mut spec.material

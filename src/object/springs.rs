@@ -48,7 +48,7 @@ pub(super) fn add(
             SpringKind::Isotropic => DMat3::from_diagonal(DVec3::splat(springs.stiffness)),
             SpringKind::Axial => {
                 let direction = (nodes[j] - nodes[i]).try_normalize();
-                let direction = direction.ok_or_else(|| refused(spec, &coincident(a, b)))?;
+                let direction = direction.ok_or_else(|| refused(spec, &coincident([a, b], nodes[i])))?;
                 springs.stiffness * outer(direction)
             }
         };

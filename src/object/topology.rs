@@ -60,18 +60,18 @@ pub(super) fn close(nodes: &[DVec3], triangles: &mut [[u32; 3]]) -> Result<Close
     check_triangles(nodes, triangles)?;
     let (around_offsets, around) = triangles_around(nodes.len(), triangles);
     if let Some(node) = (0..nodes.len()).find(|&j| around_offsets[j] == around_offsets[j + 1]) {
-        return Err(format!("node {node} belongs to no triangle: remove it"));
+        return Err(format!("{} belongs to no triangle: remove it", at(nodes, node as u32)));
     }
-    let across = pair_edges(triangles)?;
+    let across = pair_edges(nodes, triangles)?;
     // First of all: a closed surface with one side has no place in space without crossing itself.
-    let parts = orient(triangles, &across)?;
+    let parts = orient(nodes, triangles, &across)?;
     crossing::check(nodes, triangles)?;
     let mut warnings = Vec::new();
     turn_outward(nodes, triangles, &parts, &mut warnings)?;
     // Turning a triangle renumbers its edges, so the neighbours are found again.
-    let across = pair_edges(triangles)?;
+    let across = pair_edges(nodes, triangles)?;
     let topology = Topology { across, around_offsets, around };
-    check_fans(&topology, triangles)?;
+    check_fans(nodes, &topology, triangles)?;
     let components = parts.iter().map(|part| nodes_of(&part.triangles, triangles)).collect();
     Ok(ClosedSurface { topology, components, warnings })
 }
@@ -91,15 +91,38 @@ fn check_nodes(nodes: &[DVec3]) -> Result<(), String> {
             return Err(format!("node {node} has a coordinate that is not a finite number"));
         }
         if let Some(first) = places.insert(place(*position), node) {
-            return Err(coincident(first, node));
+            return Err(coincident([first, node], *position));
         }
     }
     Ok(())
 }
 
-/// The defect of two nodes at one place.
-pub(super) fn coincident(first: u32, second: u32) -> String {
-    format!("nodes {first} and {second} lie at the same point: merge them")
+/// The defect of two nodes at one place (m).
+pub(super) fn coincident([first, second]: [u32; 2], place: DVec3) -> String {
+    format!("nodes {first} and {second} lie at the same point {}: merge them", point(place))
+}
+
+/// A node as a message names it: by its number, from 0 and after nodes were merged, and by its place, which every
+/// program finds.
+pub(super) fn at(nodes: &[DVec3], node: u32) -> String {
+    format!("node {node} at {}", point(nodes[node as usize]))
+}
+
+/// An edge, likewise.
+fn between(nodes: &[DVec3], ends: [u32; 2]) -> String {
+    let [a, b] = ends.map(|end| coordinates(nodes[end as usize]));
+    format!("the edge from {a} to {b} m")
+}
+
+/// A point as a message gives it.
+fn point(place: DVec3) -> String {
+    format!("{} m", coordinates(place))
+}
+
+/// The same without its unit.
+fn coordinates(place: DVec3) -> String {
+    let [x, y, z] = place.to_array();
+    format!("({x:.4}, {y:.4}, {z:.4})")
 }
 
 /// The bits of a point: equal for equal points. Adding zero makes -0 into 0.
@@ -124,13 +147,14 @@ fn check_triangles(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String
         // Not `<=`, so that an overflow to infinity or NaN is refused as well.
         let proper = double_area > MIN_TRIANGLE_ASPECT * longest;
         if !proper {
-            let [a, b, c] = corners;
-            return Err(format!("triangle {triangle} (nodes {a} {b} {c}) has no area: remove it or merge its nodes"));
+            let place = point(a);
+            return Err(format!("triangle {triangle} at {place} has no area: remove it or merge its nodes"));
         }
         let mut sorted = *corners;
         sorted.sort_unstable();
         if let Some(first) = seen.insert(sorted, triangle) {
-            return Err(format!("triangles {first} and {triangle} have the same three nodes: remove one"));
+            let place = point(a);
+            return Err(format!("triangles {first} and {triangle} at {place} have the same three nodes: remove one"));
         }
     }
     Ok(())
@@ -159,7 +183,7 @@ fn triangles_around(nodes: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>
 type Side = ([u32; 2], u32, usize);
 
 /// The triangle across each edge of each triangle.
-fn pair_edges(triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, String> {
+fn pair_edges(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, String> {
     let mut sides: Vec<Side> = Vec::with_capacity(3 * triangles.len());
     for (triangle, corners) in triangles.iter().enumerate() {
         for k in 0..3 {
@@ -177,20 +201,22 @@ fn pair_edges(triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, String> {
                 across[*first as usize][*i] = *second;
                 across[*second as usize][*j] = *first;
             }
-            [(nodes, triangle, _)] => {
+            [(ends, ..)] => {
                 open_edges += 1;
-                open.get_or_insert((*nodes, *triangle));
+                open.get_or_insert(*ends);
             }
             many => {
-                let ([a, b], count) = (many[0].0, many.len());
-                return Err(format!("the surface is not a manifold: edge {a} to {b} has {count} triangles, not 2"));
+                let (edge, count) = (between(nodes, many[0].0), many.len());
+                return Err(format!("the surface is not a manifold: {edge} has {count} triangles, not 2"));
             }
         }
     }
     match open {
-        Some(([a, b], triangle)) => Err(format!(
-            "the surface is open: edge {a} to {b} has a triangle on one side only ({triangle}); there are {open_edges} \
-             such edges: close the holes, or merge vertices by distance"
+        Some(ends) => Err(format!(
+            "the surface is open: {} has a triangle on one side only ({} in all): close the holes, or merge vertices by \
+             distance",
+            between(nodes, ends),
+            counted(open_edges, ["edge", "edges"])
         )),
         None => Ok(across),
     }
@@ -204,7 +230,7 @@ struct Part {
 }
 
 /// Turns triangles so that neighbours run along their common edge in opposite senses; the parts that are connected.
-fn orient(triangles: &mut [[u32; 3]], across: &[[u32; 3]]) -> Result<Vec<Part>, String> {
+fn orient(nodes: &[DVec3], triangles: &mut [[u32; 3]], across: &[[u32; 3]]) -> Result<Vec<Part>, String> {
     let mut turned: Vec<Option<bool>> = vec![None; triangles.len()];
     let mut parts = Vec::new();
     for seed in 0..triangles.len() {
@@ -230,7 +256,8 @@ fn orient(triangles: &mut [[u32; 3]], across: &[[u32; 3]]) -> Result<Vec<Part>, 
                     }
                     Some(found) if found != wanted => {
                         return Err(format!(
-                            "the surface has no inside: its triangles cannot be oriented alike across edge {a} to {b}"
+                            "the surface has no inside: its triangles cannot be oriented alike across {}",
+                            between(nodes, [a, b])
                         ));
                     }
                     Some(_) => {}
@@ -273,7 +300,8 @@ fn turn_outward(
         }
         let solid = volume.abs() > MIN_TRIANGLE_ASPECT * size;
         if !solid {
-            return Err(format!("the part of the surface around node {seed} encloses no volume: it is folded flat"));
+            let seed = at(nodes, seed);
+            return Err(format!("the part of the surface around {seed} encloses no volume: it is folded flat"));
         }
         let mut turned = part.turned;
         let around = parts.iter().filter(|other| !std::ptr::eq(part, *other));
@@ -314,7 +342,7 @@ fn surrounds(nodes: &[DVec3], triangles: &[[u32; 3]], part: &Part, point: DVec3)
 }
 
 /// Refuses nodes at which two sheets touch: walking from triangle to triangle must visit all triangles around the node.
-fn check_fans(topology: &Topology, triangles: &[[u32; 3]]) -> Result<(), String> {
+fn check_fans(nodes: &[DVec3], topology: &Topology, triangles: &[[u32; 3]]) -> Result<(), String> {
     for node in 0..topology.around_offsets.len() - 1 {
         let around = topology.triangles_around(node);
         let mut current = around[0] as usize;
@@ -329,8 +357,8 @@ fn check_fans(topology: &Topology, triangles: &[[u32; 3]]) -> Result<(), String>
         }
         if visited != around.len() {
             return Err(format!(
-                "the surface is not a manifold: separate sheets meet at node {node} only: give each sheet a node of its \
-                 own"
+                "the surface is not a manifold: separate sheets meet at {} only: give each sheet a node of its own",
+                at(nodes, node as u32)
             ));
         }
     }

@@ -50,9 +50,15 @@ pub(super) struct ContactTable {
     stiffness: f64,
     #[serde(default, deserialize_with = "positive")]
     stiffness_per_length: Option<f64>,
-    /// What to do where it is one that was removed. Former scenes named it by `geometry` or `algorithm`.
-    #[serde(default = "default_law", deserialize_with = "law", alias = "geometry", alias = "algorithm")]
-    law: Result<ContactLaw, &'static str>,
+    /// What to do where it is one that was removed.
+    #[serde(default, deserialize_with = "law")]
+    law: Option<Result<ContactLaw, &'static str>>,
+    /// The law in former scenes.
+    #[serde(default, deserialize_with = "law")]
+    geometry: Option<Result<ContactLaw, &'static str>>,
+    /// The law in scenes before those.
+    #[serde(default, deserialize_with = "law")]
+    algorithm: Option<Result<ContactLaw, &'static str>>,
     #[serde(default = "tolerance", deserialize_with = "share")]
     tolerance: f64,
     #[serde(default = "max_iterations", deserialize_with = "at_least_one")]
@@ -140,18 +146,14 @@ fn at_least_one<'de, D: Deserializer<'de>>(value: D) -> Result<u32, D::Error> {
     }
 }
 
-fn default_law() -> Result<ContactLaw, &'static str> {
-    Ok(ContactLaw::default())
-}
-
 /// Reads the law of contact, by its name; the remedy for one of [`FORMER_LAWS`].
-fn law<'de, D: Deserializer<'de>>(value: D) -> Result<Result<ContactLaw, &'static str>, D::Error> {
+fn law<'de, D: Deserializer<'de>>(value: D) -> Result<Option<Result<ContactLaw, &'static str>>, D::Error> {
     let name = String::deserialize(value)?;
     if let Ok(law) = ContactLaw::from_str(&name, false) {
-        return Ok(Ok(law));
+        return Ok(Some(Ok(law)));
     }
     if let Some((_, remedy)) = FORMER_LAWS.into_iter().find(|(former, _)| *former == name) {
-        return Ok(Err(remedy));
+        return Ok(Some(Err(remedy)));
     }
     let names: Vec<String> = ContactLaw::value_variants().iter().map(|known| format!("`{}`", known.name())).collect();
     Err(D::Error::custom(format!("unknown law of contact {name:?}: take one of {}", names.join(", "))))
@@ -170,10 +172,15 @@ impl ContactTable {
         if self.updates.is_some() {
             return error("updates", "updates applied to the law \"linearised\", which no longer exists: leave it out");
         }
-        let law = self.law.map_err(|remedy| {
-            let key = LAW_KEYS.into_iter().find(|key| checker.has(&format!("contact.{key}")));
-            checker.at(&format!("contact.{}", key.unwrap_or("law")), remedy)
-        })?;
+        let named = LAW_KEYS.into_iter().zip([self.law, self.geometry, self.algorithm]);
+        let mut named = named.filter_map(|(key, law)| Some((key, law?)));
+        let law = match named.next() {
+            None => ContactLaw::default(),
+            Some((key, law)) => law.map_err(|remedy| checker.at(&format!("contact.{key}"), remedy))?,
+        };
+        if let Some((former, _)) = named.next() {
+            return error(former, "the law of contact is named twice: keep `law`, and leave this key out");
+        }
         let Self { mut stiffness, stiffness_per_length, tolerance, max_iterations, surface, round, .. } = self;
         match (stiffness > 0.0, stiffness_per_length) {
             (true, None) => {}

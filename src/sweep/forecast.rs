@@ -35,6 +35,8 @@ pub struct Forecast {
     /// Solving all points from rest, without the search for lower equilibria and the measurement of the error; absent
     /// for a GPU, whose time for few points says nothing of many (s).
     pub seconds: Option<f64>,
+    /// The search for lower equilibria and the measurement of the error that follow, at most; likewise (s).
+    pub after: Option<f64>,
     /// The dataset on disk (bytes).
     pub disk: usize,
     /// The results on disk while they are collected, with the forces from which lower equilibria are searched for
@@ -89,6 +91,10 @@ impl Sweep<'_> {
         }
         let per_sample = points as f64 / sampled.max(1) as f64;
         let seconds = per_sample * solving;
+        // Few searches for a lower equilibrium take longer than a solution from rest.
+        let searched = if self.lowest.is_some() { touching } else { 0 };
+        let measured = self.error.map_or(0, |error| error.solutions((per_sample * touching as f64) as usize));
+        let after = seconds * (searched as f64 + measured as f64 / per_sample) / touching.max(1) as f64;
         let bytes = |shape: Shape| {
             let contacts = if shape.extras.forces { (per_sample * contacts as f64).round() as usize } else { 0 };
             shape.size(points, contacts)
@@ -96,6 +102,7 @@ impl Sweep<'_> {
         Ok(Forecast {
             contact_fraction: touching as f64 / sampled.max(1) as f64,
             seconds: is_timed.then_some(seconds),
+            after: is_timed.then_some(after),
             disk: bytes(self.stored()),
             part: bytes(self.binding.shape),
             sampled,

@@ -77,8 +77,8 @@ pub struct Sweep<'a> {
     /// By which free space is found; `None` where all points are solved.
     model: Option<&'a Model<'a>>,
     /// Whose lowest equilibria are found; `None` where those from rest are taken.
-    lowest: Option<&'a Model<'a>>,
-    error: Option<ErrorCheck<'a>>,
+    pub(super) lowest: Option<&'a Model<'a>>,
+    pub(super) error: Option<ErrorCheck<'a>>,
     /// See [`Progress::forecast`].
     pub(super) forecast: Option<Forecast>,
     /// Number of nodes of the proxy.
@@ -212,7 +212,7 @@ impl<'a> Sweep<'a> {
         self.binding.provenance.backend = backend.name().into();
         self.binding.provenance.adapter = backend.adapter();
         if let (Some(forecast), false) = (&mut self.forecast, backend.is_cpu_alone()) {
-            forecast.seconds = None;
+            (forecast.seconds, forecast.after) = (None, None);
         }
     }
 

@@ -60,7 +60,7 @@ pub struct Contact {
 pub struct ObjectNode {
     /// n0 (m).
     pub rest: DVec3,
-    /// n (m).
+    /// n; not a number where the arm reaches too little of a large body for its compliance to be formed there (m).
     pub position: DVec3,
     /// Contact force f_j on it (N).
     pub force: DVec3,
@@ -79,6 +79,10 @@ impl Inspection {
             .zip(solver.displacement().chunks_exact(3))
             .map(|(&rest, u)| ObjectNode { rest, position: rest + DVec3::from_slice(u), force: DVec3::ZERO })
             .collect();
+        if !equilibrium.forces.is_empty() {
+            let unknown = |node: &usize| model.compliance.place(*node as u32).is_none();
+            (0..object_nodes.len()).filter(unknown).for_each(|node| object_nodes[node].position = DVec3::NAN);
+        }
         for contact in &equilibrium.forces {
             object_nodes[contact.node as usize].force = contact.force;
         }
@@ -128,7 +132,7 @@ fn dent(nodes: &[ObjectNode]) -> Option<f64> {
         let way = node.rest - heaviest.rest;
         (way.length(), shared(way) / whole)
     };
-    let mut ways: Vec<(f64, f64)> = nodes.iter().map(of).collect();
+    let mut ways: Vec<(f64, f64)> = nodes.iter().map(of).filter(|(_, share)| share.is_finite()).collect();
     ways.sort_by(|a, b| a.0.total_cmp(&b.0));
     let within = ways.iter().filter(|(_, share)| *share > 1.0 / std::f64::consts::E).count();
     match ways.get(within) {

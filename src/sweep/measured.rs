@@ -82,7 +82,22 @@ struct Place {
     cell: Vec<usize>,
 }
 
+/// Time of a solution by the law that follows the deformation in those by the law at rest, at most (1): 4 to 8 on the
+/// scenes that ship.
+const FOLLOWING: usize = 8;
+
 impl ErrorCheck<'_> {
+    /// Number of configurations of a dataset with so many `contacts`.
+    fn count(&self, contacts: usize) -> usize {
+        self.configurations.unwrap_or((contacts / 10).clamp(CONFIGURATIONS.start, CONFIGURATIONS.end))
+    }
+
+    /// Number of solutions from rest that take as long, at most: each configuration is solved once more, from a corner or
+    /// by the other law.
+    pub fn solutions(&self, contacts: usize) -> usize {
+        self.count(contacts) * if self.lowest { 2 } else { 1 + FOLLOWING }
+    }
+
     /// Error of the dataset of `grid` in `table`, `contacts` of whose points are in contact. `None` where it is left
     /// out, or stopped.
     pub fn measure(
@@ -92,7 +107,7 @@ impl ErrorCheck<'_> {
         contacts: usize,
         stop: &AtomicBool,
     ) -> Result<Option<Measured>, Error> {
-        let count = self.configurations.unwrap_or((contacts / 10).clamp(CONFIGURATIONS.start, CONFIGURATIONS.end));
+        let count = self.count(contacts);
         if count == 0 {
             return Ok(None);
         }

@@ -414,11 +414,21 @@ fn no_output_destroys_an_input() {
     json(folder.path(), &["play", "finger.haptize", "--seconds", "0.1", "--exact", "--record", "kept.csv", "--json"]);
     assert!(path("out/finger-press/trace.csv").is_file(), "a folder named after dataset and motion");
     std::fs::write(path("move.csv"), "0,0\n0.1,0\n").unwrap();
+    std::fs::write(path("walk.csv"), "time [s],finger [rad]\n0,0\n0.1,0\n").unwrap();
     std::fs::write(path("touch.py"), "import haptize\nprint(haptize.__version__)\n").unwrap();
     std::fs::create_dir(path("o")).unwrap();
     std::fs::copy(path("move.csv"), path("o/trace.csv")).unwrap();
     std::fs::hard_link(path("finger.haptize"), path("hard.haptize")).unwrap();
-    let all = ["finger.toml", "finger.haptize", "kept.csv", "move.csv", "touch.py", "o/trace.csv", "hard.haptize"];
+    let all = [
+        "finger.toml",
+        "finger.haptize",
+        "kept.csv",
+        "move.csv",
+        "walk.csv",
+        "touch.py",
+        "o/trace.csv",
+        "hard.haptize",
+    ];
     let contents = || all.map(|name| std::fs::read(path(name)).unwrap());
     let before = contents();
     for (arguments, expected) in [
@@ -427,9 +437,14 @@ fn no_output_destroys_an_input() {
         (&["bake", "finger.toml", "-o", "kept.csv"], "not a dataset"),
         (&["bake", "finger.toml", "-o", "o"], "no regular file"),
         (&["export", "finger.haptize", "--format", "csv", "-o", "hard.haptize"], "also an input"),
-        (&["export", "finger.haptize", "--format", "npz", "-o", "kept.csv"], "not a table or figure"),
+        (&["export", "finger.haptize", "--format", "csv", "-o", "kept.csv"], "not a table or figure"),
         (&["export", "finger.haptize", "--format", "csv", "-o", "finger.toml"], "not a table or figure"),
         (&["export", "finger.haptize", "--format", "csv", "-o", "touch.py"], "not a table or figure"),
+        (
+            &["export", "finger.haptize", "--format", "npz", "-o", "new.csv"],
+            "give --format csv, or a file whose name ends in .npz",
+        ),
+        (&["export", "finger.haptize", "--format", "csv", "-o", "walk.csv"], "not a table or figure"),
         (&["play", "finger.haptize", "--record", "touch.py"], "not a log"),
         (&["play", "finger.haptize", "--record", "finger.haptize"], "also an input"),
         (&["play", "finger.haptize", "--motion", "o/trace.csv", "-o", "o"], "also an input"),

@@ -325,8 +325,8 @@ const BROKEN: &[Broken] = &[
     (
         "stiffness = 1000",
         "stiffness = 1000\nlaw = \"rest\"\nalgorithm = \"following\"",
-        "[contact]",
-        &["duplicate", "`law`"],
+        "algorithm = \"following\"",
+        &["named twice", "keep `law`"],
     ),
     ("stiffness = 1000", "stiffness = 1000\nsurface = \"round\"", "round", &["facets", "smooth"]),
     (

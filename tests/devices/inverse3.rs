@@ -211,6 +211,22 @@ fn a_service_that_goes_on_without_an_answer_is_given_up() {
         drop(guard);
         assert!(begin.elapsed() < GIVEN_UP, "{mood:?}");
     }
+    // A force is taken back while its answer is waited for, and once more when the service is given up.
+    let mock = Mock::new();
+    let mut guard = enabled(&mock);
+    push(&mut guard, 1.0, 300);
+    mock.set(Mood::Mute);
+    let begin = Instant::now();
+    while !push(&mut guard, 1.0, 1).1.contains(&Halt::Unplugged) {
+        assert!(begin.elapsed() < GIVEN_UP);
+    }
+    drop(guard);
+    let messages = mock.messages();
+    let without_force = |message: &&Value| {
+        let vector = &message["inverse3"][0]["commands"]["set_cursor_force"]["vector"];
+        ["x", "y", "z"].iter().all(|axis| vector[axis].as_f64() == Some(0.0))
+    };
+    assert_eq!(messages.iter().rev().take_while(without_force).count(), 2, "{:?}", messages.last());
     // It ends while an answer is waited for, too.
     for mood in [Mood::Pings, Mood::Slow] {
         let mock = Mock::new();

@@ -7,11 +7,12 @@ use crate::{
 };
 use glam::DVec3;
 use haptize::{
+    JointVector,
     contact::Model,
     object::Object,
     proxy::Chain,
-    scene::{ContactLaw, ContactSpec},
-    sweep::{CpuBackend, Direct, Inspection, Run},
+    scene::{ContactLaw, ContactSpec, Scene},
+    sweep::{CpuBackend, Direct, Inspection, ObjectNode, Run},
 };
 use std::sync::atomic::AtomicBool;
 
@@ -64,6 +65,27 @@ fn an_inspection_is_complete_enough_to_recompute_the_torque() {
     let pushing: DVec3 =
         inspection.proxy_nodes.iter().filter_map(|node| node.contact.as_ref()).map(|contact| contact.force).sum();
     assert!((pushed + pushing).length() < 1e-12 * pushed.length());
+}
+
+#[test]
+fn what_a_large_body_does_out_of_reach_is_not_known() {
+    // Its compliance is formed near the arm alone.
+    let large = SCENE.replace("rings = 4, segments = 5", "rings = 46, segments = 48");
+    let scene = Scene::parse(&large, "large.toml").unwrap();
+    let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
+    let inspect = |q: [f64; 2]| {
+        let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(&q)]).unwrap();
+        Inspection::new(&model, &q)
+    };
+    let pressed = inspect([0.05, 0.045]);
+    let (known, unknown): (Vec<&ObjectNode>, Vec<&ObjectNode>) =
+        pressed.object_nodes.iter().partition(|node| node.position.is_finite());
+    assert!(!known.is_empty() && unknown.len() > known.len(), "{} of {}", known.len(), unknown.len());
+    assert!(unknown.iter().all(|node| node.force == DVec3::ZERO));
+    let deepest = known.iter().map(|node| node.position.distance(node.rest)).fold(0.0, f64::max);
+    assert!(deepest > 1e-4 && pressed.dent.is_some_and(|dent| dent > 0.0), "{deepest} {:?}", pressed.dent);
+    let free = inspect([0.05, 0.0]);
+    assert!(free.status == "free" && free.object_nodes.iter().all(|node| node.position == node.rest));
 }
 
 #[test]

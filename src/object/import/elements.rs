@@ -8,6 +8,7 @@ use super::{
     cell::{CellType, Middle, Parts},
     check_coordinates, node_number, polygon,
 };
+use crate::names::counted;
 use crate::object::element::TETRAHEDRON_EDGES;
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -51,7 +52,11 @@ impl<'a> Elements<'a> {
     /// Adds a cell of type `of` between `nodes`, which are there already, in Gmsh's order; `region` 0 is none.
     pub fn add(&mut self, of: &CellType, nodes: &[u32], region: u32) -> Result<(), String> {
         if let Some(count) = of.nodes.filter(|count| *count != nodes.len()) {
-            return Err(format!("one of the {} has {} nodes and must have {count}", of.name, nodes.len()));
+            return Err(format!(
+                "one of the {} has {} and must have {count}",
+                of.name,
+                counted(nodes.len(), ["node", "nodes"])
+            ));
         }
         self.check(nodes)?;
         match of.parts(nodes) {
@@ -186,5 +191,5 @@ pub(super) fn region(regions: &[u32], wanted: &[u32]) -> u32 {
 
 /// Counts and what is counted.
 fn listed(cells: &BTreeMap<String, usize>) -> String {
-    cells.iter().map(|(name, count)| format!("{count} {name}")).collect::<Vec<_>>().join(", ")
+    cells.iter().map(|(name, count)| format!("{name} ({count})")).collect::<Vec<_>>().join(", ")
 }

@@ -186,7 +186,7 @@ pub(super) fn read_body(
     Ok(if mesh.tetrahedra.is_empty() {
         Body::shell(surface(file, placement, mesh, format.is_soup, warnings))
     } else {
-        solid(file, placement, mesh, warnings)
+        solid(file, placement, mesh, warnings)?
     })
 }
 
@@ -214,10 +214,15 @@ fn surface(file: &Path, placement: &Placement, mesh: Mesh, is_soup: bool, warnin
     (placement.place(nodes), triangles)
 }
 
-/// Orders the nodes of tetrahedra, and finds their surface.
-fn solid(file: &Path, placement: &Placement, mesh: Mesh, warnings: &mut Vec<String>) -> Body {
+/// Orders the nodes of tetrahedra, and finds their surface; refuses those that have none.
+fn solid(file: &Path, placement: &Placement, mesh: Mesh, warnings: &mut Vec<String>) -> Result<Body, Error> {
     let nodes = placement.place(mesh.nodes);
     let (ordered, turned) = boundary::order(&nodes, mesh.tetrahedra, mesh.mid_nodes);
+    if ordered.triangles.is_empty() {
+        let reason =
+            "its tetrahedra overlap and have no surface: each face belongs to two of them: mesh the solid anew";
+        return Err(unreadable(file, reason));
+    }
     if turned > 0 {
         let (file, all) = (file.display(), ordered.tetrahedra.len());
         warnings.push(format!(
@@ -225,7 +230,7 @@ fn solid(file: &Path, placement: &Placement, mesh: Mesh, warnings: &mut Vec<Stri
             counted(turned, ["was", "were"])
         ));
     }
-    Body { regions: mesh.regions, ..ordered }
+    Ok(Body { regions: mesh.regions, ..ordered })
 }
 
 /// Least and greatest coordinates of `nodes` (m).

@@ -285,7 +285,7 @@ impl Reader<'_, '_, '_> {
                 return Err(self.file.error(message));
             }
             self.file.end_record();
-            self.elements.leave_out(format!("elements (type {kind})"), !is_boundary(kind));
+            self.elements.leave_out(format!("elements of type {kind}"), !is_boundary(kind));
             return Ok(());
         };
         let mut nodes = Vec::new();

@@ -287,7 +287,7 @@ fn damaged_files_are_refused_with_the_line_and_never_panic() {
         ("4.1", "3 1 4 48", "2 1 2 48", "line 71: an element of type 2 must have 3 nodes"),
         ("4.1", "3 1 4 48", "2 1 1 0", "$EndElements is expected here"),
         ("2.2", "\n2 4 2 0 1 10", "\n2 5 2 0 1 10", "line 41: the line ends where a number belongs"),
-        ("2.2", "\n2 4 2 0 1 10", "\n2 29 2 0 1 10", "its volume has 1 elements (type 29), of another order"),
+        ("2.2", "\n2 4 2 0 1 10", "\n2 29 2 0 1 10", "its volume has elements of type 29 (1), of another order"),
         ("4.1", "2 1 2 1\n", "3 2 7 1\n", "the line ends where a number belongs"),
         ("4.1", "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "", "line 5: $Nodes comes before $MeshFormat"),
     ] {
@@ -296,6 +296,19 @@ fn damaged_files_are_refused_with_the_line_and_never_panic() {
         let error = build(text.replacen(from, to, 1).as_bytes(), homogeneous()).unwrap_err();
         assert!(error.contains(expected) && error.contains("block.msh"), "{from} -> {to}: {error}");
     }
+    // All tetrahedra of five nodes overlap, and have no face to themselves.
+    let elements: String = (1..6)
+        .map(|left_out| {
+            let corners: Vec<String> = (1..6).filter(|node| *node != left_out).map(|node| node.to_string()).collect();
+            format!("{left_out} 4 2 0 1 {}\n", corners.join(" "))
+        })
+        .collect();
+    let closed = format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n$EndNodes\n\
+         $Elements\n5\n{elements}$EndElements\n"
+    );
+    let error = build(closed.as_bytes(), homogeneous()).err().unwrap();
+    assert!(error.contains("mesh the solid anew") && error.contains("block.msh"), "{error}");
     let mut refused = 0;
     for version in ["2.2", "4.1"] {
         let text = msh(version);
