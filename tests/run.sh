@@ -133,6 +133,7 @@ step 'tests' tests
 beside 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --features viewer --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh
+step 'its pages in a browser' python3 docs/site/browser.py target/pictures target/site/gallery/*.html
 # Last, because it leaves a library and a program in which every block is counted.
 step 'fuzzing, guided by coverage' bash tests/fuzz.sh
 joined
