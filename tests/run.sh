@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every check of this repository, in the order in which it is cheapest to fail: formatting, lints, tests, documentation
 # and a minute of fuzzing. Needs a Rust toolchain; installs lavapipe, Mesa's software Vulkan, where it is missing, since
-# the compute kernels are always tested on it: the same on every machine.
+# the compute kernels are always tested on it: the same on every machine; and Mono, which compiles and runs C#.
 #
 #   bash tests/run.sh
 set -uo pipefail
@@ -51,6 +51,14 @@ lavapipe() {
     find /usr/share/vulkan/icd.d /usr/local/share/vulkan/icd.d /etc/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1
 }
 
+# installed PACKAGE...: of Debian and Ubuntu.
+installed() {
+    local as_root=()
+    [ "$(id -u)" = 0 ] || as_root=(sudo)
+    "${as_root[@]}" apt-get update -qq &&
+        DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
 have_lavapipe() {
     [ -n "$(lavapipe)" ] && ldconfig -p | grep -q 'libvulkan\.so\.1'
 }
@@ -62,15 +70,18 @@ install_lavapipe() {
         echo '  Fedora: dnf install mesa-vulkan-drivers vulkan-loader    Arch: pacman -S vulkan-swrast vulkan-icd-loader'
         return 1
     fi
-    local as_root=()
-    [ "$(id -u)" = 0 ] || as_root=(sudo)
-    "${as_root[@]}" apt-get update -qq &&
-        DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install -y -qq --no-install-recommends \
-            mesa-vulkan-drivers libvulkan1 >/dev/null || {
+    installed mesa-vulkan-drivers libvulkan1 || {
         echo 'lavapipe could not be installed: as root, run apt-get install mesa-vulkan-drivers libvulkan1'
         return 1
     }
     have_lavapipe
+}
+
+# For the C# file of the C interface. A test says that it is skipped where there is none.
+install_mono() {
+    command -v mcs >/dev/null && command -v mono >/dev/null && return
+    command -v apt-get >/dev/null || return 0
+    installed mono-mcs mono-runtime || echo 'Mono could not be installed: the C# file is not tested'
 }
 
 have_rust() {
@@ -107,6 +118,7 @@ tests() {
 
 step 'Rust toolchain' have_rust
 step 'lavapipe' install_lavapipe
+step 'Mono' install_mono
 # Vulkan sees lavapipe and nothing else; a test that finds no adapter fails.
 VK_DRIVER_FILES=$(lavapipe)
 export VK_DRIVER_FILES VK_ICD_FILENAMES=$VK_DRIVER_FILES
@@ -121,6 +133,7 @@ step 'tests' tests
 beside 'Python package' bash python/tests/run.sh
 step 'documentation' env RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --features viewer --no-deps --quiet
 step 'documentation as a site' bash docs/site/build.sh
+step 'its pages in a browser' python3 docs/site/browser.py target/pictures target/site/gallery/*.html
 # Last, because it leaves a library and a program in which every block is counted.
 step 'fuzzing, guided by coverage' bash tests/fuzz.sh
 joined

@@ -28,10 +28,11 @@ fn the_header_is_what_the_sources_make() {
 }
 
 #[test]
-fn every_function_has_its_place_in_the_documentation() {
+fn every_function_has_its_place_in_the_documentation_and_in_csharp() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let header = std::fs::read_to_string(here.join("include/haptize.h")).unwrap();
-    let page = std::fs::read_to_string(here.join("../docs/c.md")).unwrap();
+    let [page, csharp] =
+        ["../docs/c.md", "csharp/Haptize.cs"].map(|file| std::fs::read_to_string(here.join(file)).unwrap());
     let declared = header.lines().filter(|line| !line.trim_start().starts_with("//")).flat_map(|line| {
         let words = line.split(|character: char| !character.is_alphanumeric() && character != '_');
         words.filter(|word| word.starts_with("hz_") && line.contains(&format!("{word}("))).map(str::to_owned)
@@ -40,6 +41,7 @@ fn every_function_has_its_place_in_the_documentation() {
     assert!(declared.len() > 15, "{declared:?}");
     for (k, function) in declared.iter().enumerate() {
         assert!(page.contains(&format!("`{function}`")), "docs/c.md does not name {function}");
+        assert!(csharp.contains(&format!(" {function}(")), "Haptize.cs does not declare {function}");
         assert!(!declared[..k].contains(function), "{function} is declared twice");
     }
 }

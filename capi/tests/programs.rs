@@ -110,6 +110,47 @@ fn the_examples_compile_without_a_warning_and_tell_what_the_library_tells() {
 }
 
 #[test]
+fn csharp_tells_what_the_library_tells_and_allocates_nothing_in_a_tick() {
+    if !is_there("mcs") || !is_there("mono") {
+        eprintln!("skipped: there is no C# compiler (mcs, mono)");
+        return;
+    }
+    let files = Files::new();
+    let (prefix, program) = (install(&files), files.path("Press.exe"));
+    let [scene, dataset] = ["small.toml", "small.haptize"].map(|name| files.path(name));
+    let mut compiler = Command::new("mcs");
+    compiler.args(["-langversion:7", "-warn:4", "-warnaserror"]).arg(format!("-out:{}", program.display()));
+    run(compiler.args(["examples/Press.cs", "csharp/Haptize.cs"].map(|source| Path::new(HERE).join(source))));
+    let press = |dataset: &Path| {
+        let mut command = Command::new("mono");
+        command.arg(&program).args([&scene, dataset]).args(PRESSED.map(|q| q.to_string()));
+        command.env("LD_LIBRARY_PATH", prefix.join("lib"));
+        command
+    };
+
+    let looked_up = setup::field(&Dataset::open(&dataset).unwrap(), None).unwrap().sample(&PRESSED);
+    let solved = Direct::new(&Scene::load(&scene).unwrap()).unwrap().inspect(&PRESSED).unwrap();
+    let printed = run(&mut press(&dataset));
+    let (version, rest) = printed.split_once('\n').unwrap();
+    assert_eq!(version, concat!("version ", env!("CARGO_PKG_VERSION")));
+    let lines: Vec<Vec<f64>> = rest.lines().map(numbers).collect();
+    let torque = &looked_up.torque[..2];
+    assert_eq!(lines[0], [&[0.0], torque].concat());
+    assert_eq!(lines[1], [0.0, 1.0, looked_up.energy]);
+    assert_eq!(lines[2], [&[1.0], torque].concat());
+    assert!(lines[3][..2] == [0.0, 1.0] && lines[3][3] < 0.0, "{printed}");
+    assert_eq!(lines[4], [0.0], "bytes allocated in 500 ticks");
+    assert_eq!(lines[5], [&[0.0, 1.0][..], &solved.torque].concat());
+    let force: [f64; 3] = std::array::from_fn(|axis| solved.object_nodes.iter().map(|node| node.force[axis]).sum());
+    assert_eq!(lines[6], force);
+    assert_eq!(lines[7][..2], [0.0, 1.0], "{printed}");
+
+    let failed = press(&files.path("none.haptize")).output().unwrap();
+    let message = String::from_utf8(failed.stderr).unwrap();
+    assert!(!failed.status.success() && message.starts_with("File: ") && message.contains("none.haptize"), "{message}");
+}
+
+#[test]
 fn cmake_finds_what_is_installed() {
     if !is_there("cmake") || !is_there("cc") || !is_there("c++") {
         eprintln!("skipped: there is no CMake, or no C or C++ compiler");

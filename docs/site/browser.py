@@ -4,7 +4,7 @@ as wide as a phone. Needs nothing but Python and the browser: apt-get install --
 
     python3 docs/site/browser.py FOLDER PAGE.html...     the pictures go to FOLDER
 
-It is no step of tests/run.sh: the browser is a hundred megabytes, 40 s to install.
+tests/run.sh does it where a browser is there, in less than a minute. It installs none: that is a hundred megabytes.
 """
 
 import base64
@@ -97,7 +97,8 @@ def visit(browser: Browser, page: pathlib.Path, look: str, picture: pathlib.Path
 def main(folder: str, *pages: str) -> int:
     program = next(filter(None, map(shutil.which, NAMES)), None)
     if not program:
-        raise SystemExit("there is no Chromium or Chrome on the path: install one")
+        print("skipped: there is no Chromium or Chrome on the path")
+        return 0
     place = pathlib.Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     failed = 0

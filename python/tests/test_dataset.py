@@ -34,6 +34,31 @@ def test_views_are_the_dataset(dataset, file):
     assert dataset.summary()["points"] == 63
 
 
+def test_a_refined_dataset_has_its_nodes_as_arrays(scene, dataset, tmp_path):
+    assert dataset.nodes is None
+    (tmp_path / "small.toml").write_text(scene.text)
+    refined = tmp_path / "small.haptize"
+    haptize.run("bake", tmp_path / "small.toml", max_error="0.01%", refine=2, backend="cpu", output=refined)
+    data = haptize.Dataset.open(refined)
+    nodes = data.nodes
+    count = len(nodes["level"])
+    assert np.bincount(nodes["level"]).tolist() == data.summary()["refinement"]["nodes"] and set(nodes["level"]) == {0, 1}
+    assert {name: column.shape[1:] for name, column in nodes.items()} == {
+        "level": (), "q": (2,), "torque": (2,), "energy": (), "gap": (), "status": ()
+    }
+    assert all(len(column) == count for column in nodes.values())
+    # The field is exact at nodes, whose numbers are f32.
+    field = haptize.Field(data)
+    greatest = np.abs(nodes["torque"]).max(0)
+    assert (np.abs(field.torque(nodes["q"]) - nodes["torque"]) <= 1e-5 * greatest).all() and (greatest > 0.1).any()
+    assert np.allclose(field.energy(nodes["q"]), nodes["energy"], rtol=0, atol=1e-5 * nodes["energy"].max())
+    assert np.array_equal(field.status(nodes["q"]), nodes["status"]) and set(nodes["status"]) == {0, 1}
+    assert np.array_equal(nodes["gap"] < 0, nodes["status"] == 1)
+    base = np.stack(np.meshgrid(*data.lines, indexing="ij"), -1).reshape(-1, 2)
+    coarse = nodes["q"][nodes["level"] == 0]
+    assert np.array_equal(base[np.lexsort(base.T)], coarse[np.lexsort(coarse.T)])
+
+
 def test_a_view_is_read_only_and_outlives_its_dataset(file):
     torque = haptize.Dataset.open(file).torque
     with pytest.raises(ValueError):

@@ -89,6 +89,23 @@ def test_commands_are_run_and_report(file, tmp_path):
     assert "turn" in imported["joints"] and haptize.Scene.load(imported["file"]).joints == ["turn"]
 
 
+def test_the_recipe_for_conda_says_what_the_package_says():
+    package = Path(__file__).parents[1]
+    recipe = (package / "../packaging/conda/recipe.yaml").read_text()
+    metadata = importlib.metadata.metadata("haptize")
+    required = [name for name in metadata.get_all("Requires-Dist") if "extra" not in name]
+    required += re.findall(r'requires = \["(.*)"\]', (package / "pyproject.toml").read_text())
+    assert len(required) == 2
+    for name in required:
+        assert f"- {re.sub('(?=[<>=])', ' ', name, count=1)}\n" in recipe, name
+    for field in (
+        f'version: "{haptize.__version__}"',
+        f"license: {metadata['License-Expression']}",
+        f"summary: {metadata['Summary']}",
+    ):
+        assert f"  {field}\n" in recipe, field
+
+
 def test_the_wheel_says_what_it_is_and_has_its_licences():
     distribution = importlib.metadata.distribution("haptize")
     metadata = distribution.metadata

@@ -38,7 +38,12 @@ impl Axis {
     }
 
     /// One within the axis, falling to zero one step beyond.
+    #[inline]
     fn fade(&self, coordinate: f64) -> f64 {
+        // Where most look-ups are, without a division.
+        if (self.start..=self.last()).contains(&coordinate) {
+            return 1.0;
+        }
         let beyond = (coordinate - coordinate.max(self.start).min(self.last())).abs() / self.step;
         // False for what is not a number.
         if beyond < 1.0 { 1.0 - beyond } else { 0.0 }

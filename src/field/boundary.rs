@@ -66,12 +66,14 @@ impl BoundaryLayer {
 
     /// `|torque|_K` (sqrt(J)).
     #[must_use]
+    #[inline]
     pub fn size(&self, torque: &[f64]) -> f64 {
-        torque.iter().zip(self.compliance.iter()).map(|(tau, c)| tau * tau * c).sum::<f64>().sqrt()
+        torque.iter().zip(self.compliance.padded()).map(|(tau, c)| tau * tau * c).sum::<f64>().sqrt()
     }
 
     /// The factor that shortens `torque` (N m) to `depth` (sqrt(J)); one where it is short enough.
     #[must_use]
+    #[inline]
     pub fn share(&self, torque: &[f64], depth: f64) -> f64 {
         let (depth, size) = (depth.max(0.0), self.size(torque));
         if size > depth { depth / size } else { 1.0 }

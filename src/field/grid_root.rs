@@ -21,9 +21,9 @@ use super::{
 use crate::{
     Error, JointVector,
     contact::RESIDUAL_FLOOR,
-    dataset::Grid,
+    dataset::{Axis, Grid},
     error, memory,
-    store::{Cell, Gathered, Levels, Place, Root, record::width, with_joints},
+    store::{Cell, Gathered, Levels, Place, Root, record::width, weights, with_joints},
 };
 use std::sync::Arc;
 
@@ -119,7 +119,7 @@ impl GridRoot {
     }
 
     fn around_in<const C: usize, const W: usize>(&self, fade: f64, cell: &Cell, root: &Root) -> Around {
-        let (points, weights) = (corners::<C>(&self.grid, &cell.low), cell.weights::<C>());
+        let (points, weights) = (corners::<C>(&self.grid.axes, &cell.low), weights::<C>(&cell.fractions));
         let corners = || points.into_iter().zip(weights);
         let linear: f64 = corners().map(|(point, weight)| weight * self.records[point * W].max(0.0)).sum();
         let depth = root.value.max(0.0);
@@ -128,10 +128,11 @@ impl GridRoot {
     }
 }
 
-/// The points at the corners of the cell of `grid` whose first corner lies on the lines `low`.
-pub(super) fn corners<const C: usize>(grid: &Grid, low: &Place) -> [usize; C] {
+/// The points at the corners of the cell of a grid of `axes` whose first corner lies on the lines `low`.
+#[inline]
+pub(super) fn corners<const C: usize>(axes: &[Axis], low: &[u32]) -> [usize; C] {
     let mut points = [0; C];
-    for (a, (axis, &low)) in grid.axes.iter().zip(low).enumerate() {
+    for (a, (axis, &low)) in axes.iter().zip(low).enumerate() {
         let (near, far) = points.split_at_mut(1 << a);
         for (near, far) in near.iter_mut().zip(far) {
             *near = *near * axis.count + low as usize;
@@ -160,7 +161,7 @@ impl Levels for GridRoot {
     }
 
     fn gather<const C: usize, const W: usize>(&self, _: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
-        for (corner, point) in corners::<C>(&self.grid, low).into_iter().enumerate() {
+        for (corner, point) in corners::<C>(&self.grid.axes, low).into_iter().enumerate() {
             let record = &self.records[point * W..(point + 1) * W];
             numbers.iter_mut().zip(record).for_each(|(number, entry)| number[corner] = *entry);
         }

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     Error, JointVector,
     dataset::{Axis, Grid},
-    store::{Cell, with_joints},
+    store::{Cell, weights, with_joints},
 };
 
 /// Interleaved point by point, so that a corner is one stretch of memory.
@@ -30,8 +30,8 @@ pub(super) struct Linear {
 }
 
 /// The interpolated numbers of a record.
-struct Interpolated {
-    torque: JointVector,
+struct Interpolated<const D: usize> {
+    torque: [f64; D],
     /// Below the boundary (sqrt(J)).
     depth: f64,
     /// U (J).
@@ -68,7 +68,7 @@ impl Linear {
     }
 
     /// The field between the `points` at the corners of a cell. `C = 2^D`.
-    fn at<const D: usize, const C: usize>(&self, points: &[usize; C], weights: &[f64; C]) -> Interpolated {
+    fn at<const D: usize, const C: usize>(&self, points: &[usize; C], weights: &[f64; C]) -> Interpolated<D> {
         let mut torque = [0.0; D];
         let (mut depth, mut energy) = (0.0, 0.0);
         for (&point, weight) in points.iter().zip(weights) {
@@ -79,7 +79,6 @@ impl Linear {
             depth += weight * record[D];
             energy += weight * record[D + 1];
         }
-        let mut torque = JointVector::from_slice(&torque);
         let held = self.layer.share(&torque, depth);
         torque.iter_mut().for_each(|tau| *tau *= held);
         Interpolated { torque, depth, energy, held }
@@ -88,20 +87,24 @@ impl Linear {
     /// [`Interpolant::sample`]. `C = 2^D`.
     fn sample_at<const D: usize, const C: usize>(&self, q: &[f64]) -> Sample {
         let cell = Cell::of(&self.grid, q);
-        let (points, weights) = (corners::<C>(&self.grid, &cell.low), cell.weights::<C>());
+        let (points, weights) = (corners::<C>(&self.grid.axes, &cell.low), weights::<C>(&cell.fractions));
         let at = self.at::<D, C>(&points, &weights);
         let mut around = Around::of(&self.points, self.grid.fade(q), points.into_iter().zip(weights));
         around.flags.set(Flags::LAYER, at.held < 1.0);
         around.share = at.held;
-        around.sample(at.torque, at.energy, at.depth > 0.0)
+        around.sample(JointVector::from_slice(&at.torque), at.energy, at.depth > 0.0)
     }
 
     /// [`Interpolant::torques`]. `C = 2^D`.
     fn torques_at<const D: usize, const C: usize>(&self, q: &[f64], torques: &mut [f64]) {
+        // As many axes as the compiler knows: its loops over them are unrolled.
+        let Some(axes) = self.grid.axes.first_chunk::<D>() else { return };
         for (q, torque) in q.chunks_exact(D).zip(torques.chunks_exact_mut(D)) {
-            let (cell, fade) = (Cell::of(&self.grid, q), self.grid.fade(q));
-            let at = self.at::<D, C>(&corners(&self.grid, &cell.low), &cell.weights());
-            torque.iter_mut().zip(at.torque.iter()).for_each(|(out, tau)| *out = tau * fade);
+            let cell: [(usize, f64); D] = std::array::from_fn(|a| axes[a].cell(q[a]));
+            let points = corners::<C>(axes, &cell.map(|(low, _)| low as u32));
+            let at = self.at::<D, C>(&points, &weights(&cell.map(|(_, fraction)| fraction)));
+            let fade = self.grid.fade(q);
+            torque.iter_mut().zip(at.torque).for_each(|(out, tau)| *out = tau * fade);
         }
     }
 }

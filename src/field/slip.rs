@@ -17,7 +17,7 @@ use crate::{
     store::{
         Cell, Store,
         record::{MAX_WIDTH, width},
-        with_joints,
+        weights, with_joints,
     },
 };
 use std::sync::Arc;
@@ -94,7 +94,7 @@ impl GridSlips {
     fn at<const C: usize, const W: usize>(&self, q: &[f64]) -> [f64; MAX_WIDTH] {
         let cell = Cell::of(&self.grid, q);
         let mut sums = [0.0; W];
-        for (point, weight) in corners::<C>(&self.grid, &cell.low).into_iter().zip(cell.weights::<C>()) {
+        for (point, weight) in corners::<C>(&self.grid.axes, &cell.low).into_iter().zip(weights::<C>(&cell.fractions)) {
             let record = &self.records[point * W..(point + 1) * W];
             sums.iter_mut().zip(record).for_each(|(sum, number)| *sum += weight * f64::from(*number));
         }

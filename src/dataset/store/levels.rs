@@ -6,7 +6,7 @@
 use super::{
     kernel,
     record::{MAX_WIDTH, width},
-    space::{Cell, Place},
+    space::{Cell, Place, weights},
 };
 use crate::{JointVector, dataset::Grid};
 
@@ -140,7 +140,7 @@ pub(crate) fn linear<N: Levels>(nodes: &N, cell: Cell) -> [f64; MAX_WIDTH] {
 fn linear_sum<N: Levels, const C: usize, const W: usize>(nodes: &N, cell: Cell) -> [f64; MAX_WIDTH] {
     let mut sums = [0.0; MAX_WIDTH];
     walk::<N, C, W>(nodes, cell, |_, numbers, cell| {
-        let weights = cell.weights::<C>();
+        let weights = weights::<C>(&cell.fractions);
         for (sum, numbers) in sums.iter_mut().zip(numbers) {
             *sum += numbers.iter().zip(&weights).map(|(number, weight)| weight * number).sum::<f64>();
         }

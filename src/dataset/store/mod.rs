@@ -31,7 +31,7 @@ pub mod record;
 pub mod space;
 
 pub use block::{Block, Nodes};
-pub(crate) use space::Cell;
+pub(crate) use space::{Cell, weights};
 pub use space::{Place, Space};
 
 use crate::{Error, MAX_AXES, dataset::Grid, error};

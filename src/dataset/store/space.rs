@@ -209,6 +209,19 @@ impl Space {
     }
 }
 
+/// Multilinear weights of the `C = 2^d` corners of a cell, at the first d of `fractions`.
+#[inline]
+pub(crate) fn weights<const C: usize>(fractions: &[f64]) -> [f64; C] {
+    let mut weights = [1.0; C];
+    for (a, &fraction) in fractions.iter().enumerate().take(const { C.ilog2() as usize }) {
+        let (near, far) = weights.split_at_mut(1 << a);
+        for (near, far) in near.iter_mut().zip(far) {
+            (*near, *far) = (*near * (1.0 - fraction), *near * fraction);
+        }
+    }
+    weights
+}
+
 impl Cell {
     /// The cell of `grid` around `q`, which has one entry per joint, at the grid's border beyond it.
     pub fn of(grid: &Grid, q: &[f64]) -> Self {
@@ -218,18 +231,6 @@ impl Cell {
             (cell.low[a], cell.fractions[a]) = (low as u32, fraction);
         }
         cell
-    }
-
-    /// Multilinear weights of its `C = 2^d` corners.
-    pub fn weights<const C: usize>(&self) -> [f64; C] {
-        let mut weights = [1.0; C];
-        for (a, &fraction) in self.fractions.iter().enumerate().take(const { C.ilog2() as usize }) {
-            let (near, far) = weights.split_at_mut(1 << a);
-            for (near, far) in near.iter_mut().zip(far) {
-                (*near, *far) = (*near * (1.0 - fraction), *near * fraction);
-            }
-        }
-        weights
     }
 
     /// The cell of the level above, finer by half, around the same configuration. Halving is exact.
