@@ -24,6 +24,7 @@ fi | awk -F ' *[|] *' '
             split(keys[k], part, SUBSEP)
             if (part[1] != last) printf "\n### %s\n\n| measure | cases | figures | worst | bound |\n|---|---|---:|---:|---:|\n", part[1]
             last = part[1]
-            printf "| %s | %s | %d | %s%s | %s |\n", part[2], cases[keys[k]], rows[keys[k]], worst[keys[k]], failed[keys[k]], part[3]
+            names = split(cases[keys[k]], name, ", ")
+            printf "| %s | %s | %d | %s%s | %s |\n", part[2], (names > 2 ? names " cases" : cases[keys[k]]), rows[keys[k]], worst[keys[k]], failed[keys[k]], part[3]
         }
     }'
