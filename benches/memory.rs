@@ -4,7 +4,7 @@
 //!
 //! Draws holds and presses, scrapes at four speeds, stick and slip, the energy of loops beside relaxed torques, and how
 //! far friction lies above that of several contacts; `FOLDER` is out/memory by default. Then it prints what a tick costs
-//! with either. The figures are those of docs/memory.md.
+//! with either. The figures are those of docs/effects.md.
 
 #![allow(clippy::unwrap_used)] // A benchmark may stop.
 

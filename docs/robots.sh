@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Imports ten robots of others as their makers wrote them, bakes and plays each, and prints the table of docs/robots.md.
-# Takes a minute or two, and 280 MB from the Python package index.
+# Imports ten robots of others as their makers wrote them, bakes and plays each, and prints a table (docs/robots.md).
+# Takes some minutes, and 280 MB from the Python package index.
 #
 #   bash docs/robots.sh [HAPTIZE]        the program; by default it is built
 set -euo pipefail

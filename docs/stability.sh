@@ -22,8 +22,9 @@ fi | awk -F ' *[|] *' '
     END {
         for (k = 1; k <= count; k++) {
             split(keys[k], part, SUBSEP)
-            if (part[1] != last) printf "\n### %s\n\n| measure | cases | figures | worst | bound |\n|---|---|---:|---:|---:|\n", part[1]
+            if (part[1] != last) printf "\n### %s\n\n| case: measure | worst | bound |\n|---|---:|---:|\n", part[1]
             last = part[1]
-            printf "| %s | %s | %d | %s%s | %s |\n", part[2], cases[keys[k]], rows[keys[k]], worst[keys[k]], failed[keys[k]], part[3]
+            names = split(cases[keys[k]], name, ", ")
+            printf "| %s: %s | %s%s | %s |\n", (names > 2 ? names " cases" : cases[keys[k]]), part[2], worst[keys[k]], failed[keys[k]], part[3]
         }
     }'

@@ -1,6 +1,6 @@
 //! Concave and thin bodies, and such as the lattice fits nowhere: compliance converges as the cubes shrink.
 //!
-//! The bodies have no closed form. So cubes of two sizes are compared with finer ones; `docs/solids.md` has the table.
+//! The bodies have no closed form. So cubes of two sizes are compared with finer ones; `docs/solids.md` has the worst.
 
 use super::accuracy::compliance;
 use super::*;
