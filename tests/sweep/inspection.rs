@@ -80,7 +80,7 @@ fn what_a_large_body_does_out_of_reach_is_not_known() {
     let pressed = inspect([0.05, 0.045]);
     let (known, unknown): (Vec<&ObjectNode>, Vec<&ObjectNode>) =
         pressed.object_nodes.iter().partition(|node| node.position.is_finite());
-    assert!(!known.is_empty() && unknown.len() > known.len(), "{} of {}", known.len(), unknown.len());
+    assert!(!known.is_empty() && !unknown.is_empty(), "{} and {}", known.len(), unknown.len());
     assert!(unknown.iter().all(|node| node.force == DVec3::ZERO));
     let deepest = known.iter().map(|node| node.position.distance(node.rest)).fold(0.0, f64::max);
     assert!(deepest > 1e-4 && pressed.dent.is_some_and(|dent| dent > 0.0), "{deepest} {:?}", pressed.dent);
