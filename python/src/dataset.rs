@@ -2,9 +2,10 @@
 
 use crate::{arrays, errors, threads};
 use haptize::{
+    JointVector,
     dataset::{self, Format},
     report::{self, page::Page},
-    store::record::{slope, width},
+    store::StoredNode,
 };
 use numpy::{Element, PyArrayDyn, PyArrayMethods, ndarray::ArrayViewD};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
@@ -171,31 +172,18 @@ impl Dataset {
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(store) = &self.dataset.refinement else { return Ok(None) };
-        let (space, joints) = (store.space(), store.space().joints());
-        let (mut levels, mut q, mut torque, mut energy) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (mut gap, mut status) = (Vec::new(), Vec::new());
-        for (key, block) in store.blocks() {
-            let Some((level, place)) = space.block(key) else { continue };
-            let nodes = block.nodes();
-            let solved = space.nodes(level, &place).filter(|(place, _)| nodes.present >> place & 1 == 1);
-            for ((_, node), record) in solved.zip(nodes.records.chunks_exact(width(joints))) {
-                let root = f64::from(record[0]).max(0.0);
-                levels.push(level);
-                q.extend_from_slice(&space.configuration(level, &node));
-                torque.extend((0..joints).map(|joint| -root * f64::from(record[slope(joint)])));
-                energy.push(0.5 * root * root);
-            }
-            gap.extend_from_slice(&nodes.gap);
-            status.extend_from_slice(&nodes.status);
-        }
-        let count = levels.len();
+        let (nodes, joints) = (store.nodes(), store.space().joints());
+        let count = nodes.len();
+        let vectors = |of: fn(&StoredNode) -> &JointVector| -> Vec<f64> {
+            nodes.iter().flat_map(|node| of(node).iter().copied().take(joints)).collect()
+        };
         let columns = PyDict::new(py);
-        columns.set_item("level", arrays::array(py, levels, &[count])?)?;
-        columns.set_item("q", arrays::array(py, q, &[count, joints])?)?;
-        columns.set_item("torque", arrays::array(py, torque, &[count, joints])?)?;
-        columns.set_item("energy", arrays::array(py, energy, &[count])?)?;
-        columns.set_item("gap", arrays::array(py, gap, &[count])?)?;
-        columns.set_item("status", arrays::array(py, status, &[count])?)?;
+        columns.set_item("level", arrays::array(py, nodes.iter().map(|node| node.level).collect(), &[count])?)?;
+        columns.set_item("q", arrays::array(py, vectors(|node| &node.q), &[count, joints])?)?;
+        columns.set_item("torque", arrays::array(py, vectors(|node| &node.torque), &[count, joints])?)?;
+        columns.set_item("energy", arrays::array(py, nodes.iter().map(|node| node.energy).collect(), &[count])?)?;
+        columns.set_item("gap", arrays::array(py, nodes.iter().map(|node| node.gap).collect(), &[count])?)?;
+        columns.set_item("status", arrays::array(py, nodes.iter().map(|node| node.status).collect(), &[count])?)?;
         Ok(Some(columns))
     }
 

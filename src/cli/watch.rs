@@ -103,8 +103,8 @@ fn announce(progress: &Progress) {
     let time = seconds.zip(*after).map(|(seconds, after)| {
         let left = seconds * points.saturating_sub(*done) as f64 / *points as f64;
         format!(
-            ", solved from rest in about {}, and in at most some {} with the search for lower equilibria and the \
-             measurement of accuracy that follow",
+            ", solved from rest in about {}; with the search for lower equilibria and the measurement of accuracy that \
+             follow, at most about {}",
             duration(left),
             duration(left + after)
         )

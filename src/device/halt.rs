@@ -26,6 +26,9 @@ pub enum Halt {
     /// The connection is gone.
     #[error("the device is unplugged or switched off")]
     Unplugged,
+    /// Nothing answers, though the connection is there.
+    #[error("the device does not answer in time: start its service again, or open it again")]
+    Silent,
     /// The device sends what its protocol does not know.
     #[error("the device answers what its protocol does not know: check kind and port of the device")]
     Garbage,

@@ -197,7 +197,9 @@ fn receive(socket: &mut WebSocket<Timed>) -> Result<Frame, Halt> {
             Ok(Message::Text(text)) => return Frame::parse(&text),
             Ok(Message::Ping(_) | Message::Pong(_)) => {}
             Ok(Message::Binary(_) | Message::Frame(_)) => return Err(Halt::Garbage),
-            Ok(Message::Close(_)) | Err(_) => return Err(Halt::Unplugged),
+            Ok(Message::Close(_)) => return Err(Halt::Unplugged),
+            Err(_) if socket.get_mut().left().is_err() => return Err(Halt::Silent),
+            Err(_) => return Err(Halt::Unplugged),
         }
     }
 }
@@ -266,7 +268,7 @@ impl Link {
             self.socket.get_mut().renew(STALE_COMMAND);
         }
         let mut answer = receive(&mut self.socket);
-        if pushes && answer.is_err() && self.socket.get_mut().left().is_err() {
+        if pushes && matches!(answer, Err(Halt::Silent)) {
             self.send("", Some([0.0; 3]))?;
             // Each message has a state of its own.
             answer = receive(&mut self.socket).and_then(|_| receive(&mut self.socket));

@@ -82,7 +82,7 @@ struct Place {
     cell: Vec<usize>,
 }
 
-/// Time of a solution by the law that follows the deformation in those by the law at rest, at most (1): 4 to 8 on the
+/// Time of a solution by the law that follows the deformation over that by the law at rest, at most (1): 4 to 8 on the
 /// scenes that ship.
 const FOLLOWING: usize = 8;
 

@@ -10,6 +10,7 @@ mod demo;
 mod device_scenes;
 mod docs;
 mod mcap;
+mod outputs;
 mod page;
 mod printed;
 mod report;

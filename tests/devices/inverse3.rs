@@ -201,7 +201,7 @@ fn a_service_that_goes_on_without_an_answer_is_given_up() {
         let mut guard = enabled(&mock);
         mock.set(mood);
         let (begin, mut halts) = (Instant::now(), Vec::new());
-        while !halts.contains(&Halt::Unplugged) {
+        while !halts.contains(&Halt::Silent) {
             assert!(begin.elapsed() < GIVEN_UP, "{mood:?}: {halts:?}");
             let (held, some) = push(&mut guard, 1.0, 1);
             assert!(some.is_empty() || held.effort.iter().all(|effort| *effort == 0.0), "{mood:?}");
@@ -217,7 +217,7 @@ fn a_service_that_goes_on_without_an_answer_is_given_up() {
     push(&mut guard, 1.0, 300);
     mock.set(Mood::Mute);
     let begin = Instant::now();
-    while !push(&mut guard, 1.0, 1).1.contains(&Halt::Unplugged) {
+    while !push(&mut guard, 1.0, 1).1.contains(&Halt::Silent) {
         assert!(begin.elapsed() < GIVEN_UP);
     }
     drop(guard);
@@ -358,7 +358,7 @@ fn what_the_service_may_leave_out_is_no_fault_and_what_it_may_not_ends_the_force
         (Mood::Garbage, &[Halt::Stale, Halt::Garbage][..]),
         (Mood::OtherDevice, &[Halt::Stale, Halt::Unplugged]),
         (Mood::Closed, &[Halt::Stale, Halt::Unplugged]),
-        (Mood::Mute, &[Halt::Stale, Halt::Unplugged]),
+        (Mood::Mute, &[Halt::Stale, Halt::Silent]),
     ] {
         let mock = Mock::new();
         let mut guard = enabled(&mock);

@@ -1,7 +1,7 @@
 //! The contents of a block: the nodes that were solved, and what they add to the interpolation of the levels below.
 
 use super::{record::width, space::Place};
-use crate::{MAX_AXES, contact::Status};
+use crate::{JointVector, MAX_AXES, contact::Status};
 
 /// Solved nodes of a block, ascending by their place in it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +17,23 @@ pub struct Nodes {
     pub gap: Vec<f32>,
     /// [`Status`] as its number.
     pub status: Vec<u8>,
+}
+
+/// A solved node of a store.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StoredNode {
+    /// Level, 0 for the base.
+    pub level: u32,
+    /// Configuration (rad or m).
+    pub q: JointVector,
+    /// Torque (N m or N).
+    pub torque: JointVector,
+    /// Stored energy (J).
+    pub energy: f64,
+    /// Smallest signed distance between proxy and object at rest (m).
+    pub gap: f32,
+    /// [`Status`] as its number.
+    pub status: u8,
 }
 
 impl Nodes {

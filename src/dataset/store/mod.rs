@@ -30,11 +30,11 @@ mod levels;
 pub mod record;
 pub mod space;
 
-pub use block::{Block, Nodes};
+pub use block::{Block, Nodes, StoredNode};
 pub(crate) use space::{Cell, weights};
 pub use space::{Place, Space};
 
-use crate::{Error, MAX_AXES, dataset::Grid, error};
+use crate::{Error, JointVector, MAX_AXES, dataset::Grid, error};
 pub(crate) use block::beyond;
 pub use levels::Root;
 use levels::linear;
@@ -97,6 +97,26 @@ impl Store {
         let mut blocks: Vec<_> = self.blocks.iter().map(|(key, block)| (*key, block)).collect();
         blocks.sort_unstable_by_key(|(key, _)| *key);
         blocks
+    }
+
+    /// All solved nodes, block by block: those of the base first.
+    #[must_use]
+    pub fn nodes(&self) -> Vec<StoredNode> {
+        let (space, width) = (&self.space, record::width(self.space.joints()));
+        let mut all = Vec::new();
+        for (key, block) in self.blocks() {
+            let (Some((level, place)), nodes) = (space.block(key), block.nodes()) else { continue };
+            let own = space.nodes(level, &place).filter(|(place, _)| nodes.present >> place & 1 == 1);
+            for (k, ((_, node), record)) in own.zip(nodes.records.chunks_exact(width)).enumerate() {
+                let root = f64::from(record[0]).max(0.0);
+                let q = space.configuration(level, &node);
+                let mut torque = JointVector::zeros(space.joints());
+                torque.iter_mut().enumerate().for_each(|(a, tau)| *tau = -root * f64::from(record[record::slope(a)]));
+                let (energy, gap, status) = (0.5 * root * root, nodes.gap[k], nodes.status[k]);
+                all.push(StoredNode { level, q, torque, energy, gap, status });
+            }
+        }
+        all
     }
 
     /// The blocks on which a block of `level` rests, by level and place: those that hold the corners of the cells of
