@@ -31,7 +31,12 @@ pub fn watched<T, E: Into<Failure>>(
             Begun { at: Instant::now(), contact_points: progress.contact_points }
         });
         let message = format!("{} in contact, {:.0}/s", progress.contact_points, progress.rate);
-        bar.set(progress.done as u64, progress.points as u64, message, begun.left(&progress));
+        bar.set(
+            progress.done as u64,
+            progress.points as u64,
+            message,
+            begun.left(begun.at.elapsed().as_secs_f64(), &progress),
+        );
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
     let result = bake(Bake { scene, backend, measured: None, aim: None, date: &date, stop, progress: &mut progress });
@@ -48,16 +53,15 @@ struct Begun {
 }
 
 impl Begun {
-    /// Time left, by the points in contact that are expected: those in free space cost next to nothing, and may come
-    /// first. None where no more are expected, or too few are solved to tell (s).
-    fn left(self, progress: &Progress) -> Option<f64> {
+    /// Time left after `elapsed`, by the points in contact that are expected: those in free space cost next to nothing, and
+    /// may come first. None where no more are expected (s).
+    fn left(self, elapsed: f64, progress: &Progress) -> Option<f64> {
         let Forecast { contact_fraction, seconds, .. } = progress.forecast?;
         let expected = (contact_fraction * progress.points as f64) as usize;
         let left = expected.checked_sub(progress.contact_points).filter(|left| *left > 0)?;
-        let solved = progress.contact_points - self.contact_points;
-        match solved {
-            0 => seconds.map(|seconds| seconds * left as f64 / expected.max(1) as f64),
-            solved => Some(self.at.elapsed().as_secs_f64() * left as f64 / solved as f64),
+        match progress.contact_points.saturating_sub(self.contact_points) {
+            0 => seconds.map(|seconds| seconds * left as f64 / expected as f64),
+            solved => Some(elapsed * left as f64 / solved as f64),
         }
     }
 }
@@ -118,4 +122,27 @@ fn announce(progress: &Progress) {
 /// Rounded up, with unit.
 pub fn megabytes(bytes: usize) -> String {
     format!("{} MB", (bytes as f64 / 1e6).ceil())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_goes_by_points_in_contact() {
+        let forecast =
+            Forecast { contact_fraction: 0.1, seconds: Some(50.0), after: None, disk: 0, part: 0, sampled: 500 };
+        let left = |done, contact_points, before| {
+            let footprint = Footprint::default();
+            let progress =
+                Progress { done, points: 1000, contact_points, rate: 0.0, footprint, forecast: Some(forecast) };
+            Begun { at: Instant::now(), contact_points: before }.left(6.0, &progress)
+        };
+        // Nine tenths are free, and done at once: what was predicted is still to come.
+        assert_eq!(left(900, 0, 0), Some(50.0));
+        assert_eq!(left(930, 30, 0), Some(14.0));
+        // Taken up at 20: ten have taken these six seconds.
+        assert_eq!(left(930, 30, 20), Some(42.0));
+        assert_eq!(left(990, 100, 0), None);
+    }
 }
