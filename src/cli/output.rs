@@ -12,7 +12,7 @@ use crate::{
     paper::HEADING,
     render::recording::SIGNATURE as SESSION,
     report::page,
-    scan::SIGNATURE,
+    scan::{PLAN, SIGNATURE},
     scene::Scene,
     twin::OBJ,
     vtk,
@@ -67,7 +67,8 @@ impl Content {
         let page = begins(b".ie ") && holds(b".TH haptize")
             || begins(HEADING.as_bytes())
             || begins(page::OPENING.as_bytes())
-            || begins(vtk::OPENING.as_bytes());
+            || begins(vtk::OPENING.as_bytes())
+            || begins(PLAN.as_bytes());
         let archive = begins(b"PK") && holds(b"torque.npy");
         let shape = begins(OBJ.as_bytes());
         let hdf5 = begins(b"\x89HDF") && holds(b"torque");

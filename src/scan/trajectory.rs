@@ -25,6 +25,9 @@ pub struct Trajectory {
     pub rows: Vec<(f64, JointVector)>,
 }
 
+/// First line of a plan's table. Without it the plan would look like a motion that a person has recorded.
+pub const PLAN: &str = "# a plan of haptize";
+
 impl Trajectory {
     /// Returns the trajectory through `plan` at `speed` (rad/s or m/s), resting for `dwell` (s) at each point.
     #[must_use]
@@ -55,11 +58,12 @@ impl Trajectory {
         self.rows.last().map_or(0.0, |(time, _)| *time)
     }
 
-    /// Writes it as CSV: a header, then time and configuration of each row. `haptize play --motion` reads it, too.
+    /// Writes it as CSV: [`PLAN`], a header, then time and configuration of each row. `haptize play --motion` reads it, too.
     ///
     /// # Errors
     /// Those of `out`.
     pub fn write_csv(&self, joints: &[JointLabel], out: &mut impl Write) -> io::Result<()> {
+        writeln!(out, "{PLAN}")?;
         let mut table = Table::new(out);
         table.field("time [s]")?;
         table.fields(joints.iter().map(|joint| format!("{} [{}]", plain(&joint.name), joint.unit)))?.end()?;

@@ -41,7 +41,7 @@ def plan_is_read(program: Path, folder: Path) -> None:
     scene = Path(__file__).parents[2] / "datasets" / "sponge.toml"
     told = run(program, folder, "scan", str(scene), "--plan-out", "plan.mcap")
     run(program, folder, "scan", str(scene), "--plan-out", "plan.csv")
-    table = np.loadtxt(folder / "plan.csv", delimiter=",", skiprows=1)
+    table = np.loadtxt(folder / "plan.csv", delimiter=",", skiprows=2)
     states = read(folder / "plan.mcap")
     assert len(states) == told["rows"] == len(table), (len(states), told)
     for (topic, state), row in zip(states, table):
