@@ -347,6 +347,8 @@ mod tests {
             "# The paper's sphere, by me\n",
             "q_a [rad],q_b [rad],tau_a [N m],tau_b [N m]\n",
             "time [s],q_a [rad],tau_a [N m]\n",
+            // A motion that was recorded: without the first line of a plan.
+            "time [s],a [rad],lift [m]\n",
         ] {
             assert_eq!(Content::of(mine.as_bytes()), None, "{mine}");
         }
@@ -358,7 +360,7 @@ mod tests {
             "a [rad],lift [m],torque a [N m],force lift [N],energy [J],gap [m],status\r\n",
             "point (row of the other file from 0),node,force x [N]\n",
             "study,series,setting,value\n",
-            "time [s],a [rad],lift [m]\n",
+            "# a plan of haptize\ntime [s],a [rad],lift [m]\n",
         ] {
             assert_eq!(Content::of(ours.as_bytes()), Some(Content::Product), "{ours}");
         }
