@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Prints the tables of docs/stability.md: of each measure of the hard cases the worst figure over all that was varied.
+# Prints a table of the hard cases (docs/stability.md): of each measure of the hard cases the worst figure over all that was varied.
 #
 # bash docs/stability.sh [FILE]    FILE: what the hard cases printed; without it they are run, which takes minutes.
 set -euo pipefail

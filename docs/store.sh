@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Redraws the figures of docs/store.md, and prints its tables. Takes some minutes.
+# Redraws the figures of docs/store.md. Takes some minutes.
 #
 # bash docs/store.sh
 set -euo pipefail
