@@ -50,11 +50,7 @@ pub struct Refinement {
 impl Refinement {
     fn of(store: &Store) -> Self {
         let mut nodes = vec![0; store.space().levels() as usize];
-        for (key, block) in store.blocks() {
-            if let Some((level, _)) = store.space().block(key) {
-                nodes[level as usize] += block.nodes().count();
-            }
-        }
+        store.nodes().for_each(|node| nodes[node.level as usize] += 1);
         Self { nodes, bytes: store.bytes() }
     }
 }

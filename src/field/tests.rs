@@ -222,7 +222,7 @@ fn inconsistent_datasets_are_refused_with_the_reason() {
     }
     let mut short = good();
     short.torque = vec![0.0; 29].into();
-    assert!(new(short, 0.5, &[1.0, 1.0]).contains("torque has 29 entries where its grid asks for 30"));
+    assert!(new(short, 0.5, &[1.0, 1.0]).contains("torque has 29 entries where the grid asks for 30"));
     let mut wild = good();
     wild.torque = vec![f64::NAN; 30].into();
     assert!(new(wild, 0.5, &[1.0, 1.0]).contains(" is NaN: bake it again"));

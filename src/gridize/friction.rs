@@ -255,7 +255,7 @@ mod tests {
             let direction = if speed > 0.0 { LeadDirection::Forward } else { LeadDirection::Backward };
             let torque = [(3.0 * q).sin() / 3.0 - force * h / size, 0.2 * q - force * other / size];
             let torque = torque.map(|tau| tau + 2e-3 * noise.normal());
-            history.push(time, &[q, 0.7 - gear * q], &torque, (speed.abs() > 0.05).then_some(direction));
+            history.push(time, &[q, 0.7 - gear * q], &torque, (true, (speed.abs() > 0.05).then_some(direction)));
         }
         history
     }

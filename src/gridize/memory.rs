@@ -48,18 +48,18 @@ pub struct ForceHistory {
     pub torques: Vec<f64>,
     /// Whether each row counts: held by a device whose own inertia and friction are not in it.
     pub counts: Vec<bool>,
-    /// Where the lead joint goes in each row, where it moves; empty where none leads.
+    /// Where the lead joint goes in each row, where there is one and it moves.
     pub directions: Vec<Option<LeadDirection>>,
 }
 
 impl ForceHistory {
-    /// Adds a row that counts.
-    pub fn push(&mut self, time: f64, q: &[f64], torque: &[f64], direction: Option<LeadDirection>) {
+    /// Adds a row: whether it counts, and where the lead joint goes.
+    pub fn push(&mut self, time: f64, q: &[f64], torque: &[f64], (counts, way): (bool, Option<LeadDirection>)) {
         self.times.push(time);
         self.configurations.extend_from_slice(q);
         self.torques.extend_from_slice(torque);
-        self.counts.push(true);
-        self.directions.push(direction);
+        self.counts.push(counts);
+        self.directions.push(way);
     }
 
     /// Configuration and torque of row `row`, of `joints` numbers each.
@@ -234,10 +234,8 @@ mod tests {
                 }
                 let separation = TERMS[0][0] * z[0] + TERMS[1][0] * z[1];
                 if tick % 20 == 0 && w > 0.0 {
-                    history.times.push(time);
-                    history.configurations.push(q);
-                    history.torques.push(-2.0 * ((2.0 * q).exp() - 1.0) * (1.0 - separation / w).max(0.0));
-                    history.counts.push(true);
+                    let torque = -2.0 * ((2.0 * q).exp() - 1.0) * (1.0 - separation / w).max(0.0);
+                    history.push(time, &[q], &[torque], (true, None));
                 }
             }
         }

@@ -323,7 +323,7 @@ impl<'a> Import<'a> {
             }
         }
         if let Some(history) = self.histories.last_mut().filter(|_| relaxes || friction) {
-            history.push(block.time, &block.q, &block.torque, (lead.abs() > still).then_some(direction));
+            history.push(block.time, &block.q, &block.torque, (true, (lead.abs() > still).then_some(direction)));
         }
         match keep {
             Keep::All => {

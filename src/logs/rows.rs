@@ -232,7 +232,7 @@ fn converted(quantity: &Quantity, raw: f64) -> f64 {
 
 /// SI units that one of `unit` is (1).
 fn in_si(unit: Option<ColumnUnit>) -> f64 {
-    unit.map_or(1.0, |unit| unit.in_si().0)
+    unit.map_or(1.0, |unit| unit.factor)
 }
 
 /// The first of `names`, as many as a message has room for.

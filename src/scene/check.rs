@@ -134,7 +134,7 @@ impl Checker<'_> {
 
 /// The place of what `key` names in a TOML text, keys and numbers of entries with dots between; where there is no such
 /// thing, that of the table around it, and false.
-fn find(text: &str, key: &str) -> (Range<usize>, bool) {
+pub(crate) fn find(text: &str, key: &str) -> (Range<usize>, bool) {
     let Ok(root) = DeTable::parse(text) else { return (0..0, false) };
     let root = DeValue::Table(root.into_inner());
     let (mut place, mut value) = (0..0, &root);

@@ -71,15 +71,6 @@ pub struct Merge {
     pub notes: Vec<String>,
 }
 
-/// A dataset put together.
-#[derive(Clone, Debug)]
-pub struct Merged {
-    /// Number of shards.
-    pub shards: usize,
-    /// As of a bake that is continued after its last point.
-    pub report: SweepReport,
-}
-
 impl Merge {
     /// Reads the shards at `paths`: files, and all that lie in folders.
     ///
@@ -138,9 +129,11 @@ impl Merge {
     }
 
     /// Puts the dataset `output` together, with its error measured at `measured` configurations as in
-    /// [`super::Bake::measured`]. What an interrupted merge has left is continued.
+    /// [`super::Bake::measured`]. What an interrupted merge has left is continued. The report is that of a bake that is
+    /// continued after its last point.
     ///
-    /// # Errors When shards are missing, the output cannot be written, or the merge is stopped; an earlier file
+    /// # Errors
+    /// When shards are missing, the output cannot be written, or the merge is stopped; an earlier file
     /// `output` is then untouched.
     pub fn to_file(
         &self,
@@ -148,7 +141,7 @@ impl Merge {
         measured: Option<usize>,
         stop: &AtomicBool,
         progress: &mut dyn FnMut(Progress),
-    ) -> Result<Merged, Error> {
+    ) -> Result<SweepReport, Error> {
         let missing = self.missing();
         let Some(first) = self.shards.values().next().filter(|_| missing.is_empty()) else {
             return Err(self.lacks(&missing));
@@ -166,11 +159,10 @@ impl Merge {
         }
         self.copy(&sweep, output)?;
         let run = Run { chunk: 1, stop, progress };
-        let report = sweep.bake(&mut Idle, output, true, run).map_err(|error| match error.kind() {
+        sweep.bake(&mut Idle, output, true, run).map_err(|error| match error.kind() {
             ErrorKind::Stopped => error!("stopped; the same command continues").of(ErrorKind::Stopped),
             _ => error,
-        })?;
-        Ok(Merged { shards: self.count, report })
+        })
     }
 
     /// Copies what a part of `output` lacks into it.

@@ -166,11 +166,7 @@ impl Reference {
             unit: self.norm.unit,
             interpolation: interpolation.name().to_owned(),
             errors,
-            cut: None,
-            geometry: None,
-            rounding: None,
-            rounded: None,
-            friction: None,
+            ..MeasuredError::default()
         }
     }
 

@@ -24,6 +24,8 @@ pub struct Nodes {
 pub struct StoredNode {
     /// Level, 0 for the base.
     pub level: u32,
+    /// Its place among the nodes of the level.
+    pub place: Place,
     /// Configuration (rad or m).
     pub q: JointVector,
     /// Torque (N m or N).

@@ -100,23 +100,19 @@ impl Store {
     }
 
     /// All solved nodes, block by block: those of the base first.
-    #[must_use]
-    pub fn nodes(&self) -> Vec<StoredNode> {
-        let (space, width) = (&self.space, record::width(self.space.joints()));
-        let mut all = Vec::new();
-        for (key, block) in self.blocks() {
-            let (Some((level, place)), nodes) = (space.block(key), block.nodes()) else { continue };
-            let own = space.nodes(level, &place).filter(|(place, _)| nodes.present >> place & 1 == 1);
-            for (k, ((_, node), record)) in own.zip(nodes.records.chunks_exact(width)).enumerate() {
+    pub fn nodes(&self) -> impl Iterator<Item = StoredNode> {
+        let (space, wide) = (&self.space, width(self.space.joints()));
+        let blocks = self.blocks().into_iter().filter_map(|(key, block)| Some((space.block(key)?, block.nodes())));
+        blocks.flat_map(move |((level, block), nodes)| {
+            let own = space.nodes(level, &block).filter(|(place, _)| nodes.present >> place & 1 == 1);
+            own.zip(nodes.records.chunks_exact(wide)).enumerate().map(move |(k, ((_, place), record))| {
                 let root = f64::from(record[0]).max(0.0);
-                let q = space.configuration(level, &node);
                 let mut torque = JointVector::zeros(space.joints());
-                torque.iter_mut().enumerate().for_each(|(a, tau)| *tau = -root * f64::from(record[record::slope(a)]));
-                let (energy, gap, status) = (0.5 * root * root, nodes.gap[k], nodes.status[k]);
-                all.push(StoredNode { level, q, torque, energy, gap, status });
-            }
-        }
-        all
+                torque.iter_mut().enumerate().for_each(|(a, tau)| *tau = -root * f64::from(record[slope(a)]));
+                let (q, energy) = (space.configuration(level, &place), 0.5 * root * root);
+                StoredNode { level, place, q, torque, energy, gap: nodes.gap[k], status: nodes.status[k] }
+            })
+        })
     }
 
     /// The blocks on which a block of `level` rests, by level and place: those that hold the corners of the cells of
