@@ -194,8 +194,7 @@ impl Reversals<'_> {
         takes: impl Fn(usize) -> bool,
     ) -> Result<Option<Vec<[f64; 2]>>, Error> {
         let joints = dataset.grid.joints();
-        let mut slopes = JointVector::zeros(joints);
-        slopes.fill(NO_LAYER);
+        let slopes = std::iter::repeat_n(NO_LAYER, joints).collect();
         let field = TorqueField::interpolated(dataset, Interpolation::Linear, THRESHOLD, &slopes)?;
         let (mut count, mut squares) = (0.0, vec![[0.0; 2]; joints]);
         for (history, strokes) in self.histories.iter().zip(self.strokes()) {
@@ -203,9 +202,7 @@ impl Reversals<'_> {
             let mut before: Option<JointVector> = None;
             for (row, stroke) in strokes.into_iter().enumerate() {
                 let [q, measured] = history.row(row, joints);
-                let mut way = q;
-                way.iter_mut().zip(before.unwrap_or(q).iter()).for_each(|(way, before)| *way -= before);
-                before = Some(q);
+                let way = q.iter().zip(before.replace(q).unwrap_or(q).iter()).map(|(q, before)| q - before).collect();
                 let sample = field.sample(&q);
                 let slip = field.slip(&q, &sample);
                 deflection = slip.deflected(&deflection, &way).shortened(slip.normal_force / stiffness);

@@ -143,11 +143,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
         let skip = usize::from(layout.time.is_some());
         let stamp = layout.time.map(|_| found[0] * in_si(self.mapping.time.unit) * self.mapping.time.scale);
-        let (mut q, mut torque) = (JointVector::zeros(joints), JointVector::zeros(joints));
-        for (joint, spec) in self.mapping.joints.iter().enumerate() {
-            q[joint] = converted(&spec.position, found[skip + joint]);
-            torque[joint] = self.mapping.torque.effort.sign() * converted(&spec.torque, found[skip + joints + joint]);
-        }
+        let (specs, sign) = (|| self.mapping.joints.iter(), self.mapping.torque.effort.sign());
+        let q = specs().zip(&found[skip..]).map(|(spec, raw)| converted(&spec.position, *raw)).collect();
+        let torque = specs().zip(&found[skip + joints..]).map(|(spec, raw)| sign * converted(&spec.torque, *raw));
+        let torque = torque.collect();
         self.timed(stamp, q, torque).map(Some)
     }
 

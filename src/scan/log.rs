@@ -344,10 +344,7 @@ fn row(line: &str, joints: usize) -> Result<ScanRow, String> {
         let wrong = || format!("column {} holds `{}`, not a finite number", column + 1, fields[column]);
         value.filter(|value| value.is_finite()).ok_or_else(wrong)
     };
-    let vector = |first: usize| {
-        let values: Result<Vec<f64>, String> = (first..first + joints).map(number).collect();
-        values.map(|values| JointVector::from_slice(&values))
-    };
+    let vector = |first: usize| (first..first + joints).map(number).collect::<Result<JointVector, String>>();
     let whole = |column: usize| {
         let wrong = || format!("column {} holds `{}`, not a whole number", column + 1, fields[column]);
         fields[column].parse::<u32>().map_err(|_| wrong())

@@ -34,7 +34,7 @@ pub use block::{Block, Nodes, StoredNode};
 pub(crate) use space::{Cell, weights};
 pub use space::{Place, Space};
 
-use crate::{Error, JointVector, MAX_AXES, dataset::Grid, error};
+use crate::{Error, MAX_AXES, dataset::Grid, error};
 pub(crate) use block::beyond;
 pub use levels::Root;
 use levels::linear;
@@ -107,8 +107,7 @@ impl Store {
             let own = space.nodes(level, &block).filter(|(place, _)| nodes.present >> place & 1 == 1);
             own.zip(nodes.records.chunks_exact(wide)).enumerate().map(move |(k, ((_, place), record))| {
                 let root = f64::from(record[0]).max(0.0);
-                let mut torque = JointVector::zeros(space.joints());
-                torque.iter_mut().enumerate().for_each(|(a, tau)| *tau = -root * f64::from(record[slope(a)]));
+                let torque = (0..space.joints()).map(|a| -root * f64::from(record[slope(a)])).collect();
                 let (q, energy) = (space.configuration(level, &place), 0.5 * root * root);
                 StoredNode { level, place, q, torque, energy, gap: nodes.gap[k], status: nodes.status[k] }
             })
