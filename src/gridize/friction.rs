@@ -137,16 +137,10 @@ impl Reversals<'_> {
                     .extend((0..=k).map(|l| if size > 0.0 { (half[k] * half[l] / (size * size)) as f32 } else { 0.0 }));
             }
             if status[point] != Status::Outside as u8 {
-                let felt = [-1.0, 1.0].map(|side| {
-                    centre
-                        .iter()
-                        .zip(half.iter())
-                        .map(|(centre, half)| (centre + side * half).powi(2))
-                        .sum::<f64>()
-                        .sqrt()
-                });
-                status[point] =
-                    if felt[0].max(felt[1]) > report.epsilon { Status::Contact } else { Status::Free } as u8;
+                let both = || centre.iter().zip(half.iter());
+                let felt = |side: f64| both().map(|(centre, half)| (centre + side * half).powi(2)).sum::<f64>().sqrt();
+                let touches = felt(-1.0).max(felt(1.0)) > report.epsilon;
+                status[point] = if touches { Status::Contact } else { Status::Free } as u8;
             }
         }
         report.contact_points = status.iter().filter(|status| **status == Status::Contact as u8).count();

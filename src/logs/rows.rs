@@ -46,14 +46,8 @@ struct Layout {
     torques: Vec<usize>,
 }
 
-/// Result of reading a line.
-#[expect(clippy::large_enum_variant, reason = "one at a time; a box would be memory for every row")]
-pub(super) enum ReadRowResult {
-    Row(Row),
-    /// Left out, and why.
-    Dropped(Reason),
-    End,
-}
+/// A row, or why it was left out.
+type ReadRow = Result<Row, Reason>;
 
 impl<'a, R: BufRead> Rows<'a, R> {
     pub fn new(mapping: &'a Mapping, reader: R, file: &str) -> Self {
@@ -69,8 +63,8 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
     }
 
-    /// The next row, or why a line was left out.
-    pub fn next(&mut self) -> Result<ReadRowResult, Error> {
+    /// The next row, or why a line was left out; `None` at the end.
+    pub fn next(&mut self) -> Result<Option<ReadRow>, Error> {
         let mut line = std::mem::take(&mut self.text);
         while let Some(text) = self.lines.next(&mut line)? {
             let text = text.trim_ascii_end();
@@ -80,10 +74,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
             }
             if let Some(outcome) = self.line_outcome(text)? {
                 self.text = line;
-                return Ok(outcome);
+                return Ok(Some(outcome));
             }
         }
-        Ok(ReadRowResult::End)
+        Ok(None)
     }
 
     fn error(&self, message: String) -> Error {
@@ -91,7 +85,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// Parses a line that is no comment; `None` for the header.
-    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRowResult>, Error> {
+    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRow>, Error> {
         let delimiter = self.mapping.table.delimiter;
         let Ok(text) = std::str::from_utf8(text) else {
             if self.layout.is_none() {
@@ -151,13 +145,13 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// Places a row in time: repeated stamps are left out, going back is refused, a long pause begins a segment.
-    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<ReadRowResult, Error> {
+    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<ReadRow, Error> {
         let period = self.mapping.time.period.unwrap_or(0.0);
         let time = stamp.unwrap_or(self.count as f64 * period);
         let mut first = self.last_time.is_none();
         if let Some(last) = self.last_time {
             if time == last {
-                return Ok(ReadRowResult::Dropped(Reason::RepeatedTime));
+                return Ok(Err(Reason::RepeatedTime));
             }
             if time < last {
                 return self.refuse(Reason::TimeGoesBack, format!("time goes back from {last} s to {time} s"));
@@ -167,12 +161,12 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
         self.last_time = Some(time);
         self.count += 1;
-        Ok(ReadRowResult::Row(Row { first, line: self.lines.number, time, q, torque }))
+        Ok(Ok(Row { first, line: self.lines.number, time, q, torque }))
     }
 
-    fn refuse(&self, reason: Reason, message: String) -> Result<ReadRowResult, Error> {
+    fn refuse(&self, reason: Reason, message: String) -> Result<ReadRow, Error> {
         match self.mapping.table.bad_rows {
-            BadRows::Drop => Ok(ReadRowResult::Dropped(reason)),
+            BadRows::Drop => Ok(Err(reason)),
             BadRows::Refuse => Err(self.error(format!("{message}; `bad_rows = \"drop\"` would leave the row out"))),
         }
     }

@@ -163,6 +163,10 @@ impl Reach {
         let contact = share(touching.len(), met.len());
         let (within, touching_within) =
             (met.iter().filter(is_within).count(), touching.iter().filter(is_within).count());
+        let within_depth = |depth: f64| {
+            let count = touching.iter().filter(|met| -met.gap <= depth).count();
+            DepthShare { depth, share: share(count, touching.len()) }
+        };
         let width = |range: [f64; 2]| range[1] - range[0];
         Ok(Self {
             configurations: met.len(),
@@ -172,15 +176,7 @@ impl Reach {
             body,
             shallow,
             deepest: touching.iter().filter(is_within).map(|met| -met.gap).fold(0.0, f64::max),
-            depths: DEPTHS
-                .map(|part| {
-                    let depth = part * body;
-                    DepthShare {
-                        depth,
-                        share: share(touching.iter().filter(|met| -met.gap <= depth).count(), touching.len()),
-                    }
-                })
-                .to_vec(),
+            depths: DEPTHS.map(|part| within_depth(part * body)).to_vec(),
             joints,
         })
     }

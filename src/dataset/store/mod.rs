@@ -35,6 +35,7 @@ pub(crate) use space::{Cell, weights};
 pub use space::{Place, Space};
 
 use crate::{Error, MAX_AXES, dataset::Grid, error};
+use block::Numbers;
 pub(crate) use block::beyond;
 pub use levels::Root;
 use levels::linear;
@@ -213,7 +214,9 @@ impl Store {
             for side in 0..corners {
                 let corner = beyond(&cell.low, side);
                 let Some(block) = self.get(below, &self.space.block_of(&corner)) else { continue };
-                let Some(surplus) = block.surplus_at(self.space.place_of(&corner), wide) else { continue };
+                let Some(surplus) = block.surplus_at(Numbers::Root, self.space.place_of(&corner), wide) else {
+                    continue;
+                };
                 let Some(weights) = kernel::transfer(joints, side, &cell.fractions) else { continue };
                 for ((sum, weights), set) in sum.iter_mut().zip(&weights).zip(sets(joints)) {
                     let scale = f64::from(1_u32 << below).powi(set.count_ones() as i32);
@@ -271,7 +274,7 @@ impl Levels for Store {
     }
 
     fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
-        self.gathered(level, low, numbers, Block::surplus_at)
+        self.gathered(level, low, numbers, Numbers::Root)
     }
 }
 
@@ -291,19 +294,19 @@ impl Levels for Slips<'_> {
     }
 
     fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
-        self.store.gathered(level, low, numbers, Block::slip_surplus_at)
+        self.store.gathered(level, low, numbers, Numbers::Slip)
     }
 }
 
 impl Store {
-    /// [`Levels::gather`] of the numbers that `surplus_at` gives of a block's node.
+    /// [`Levels::gather`] of the numbers `of` a block's nodes.
     #[inline(always)]
     fn gathered<const C: usize, const W: usize>(
         &self,
         level: u32,
         low: &Place,
         numbers: &mut [[f64; C]; W],
-        surplus_at: impl Fn(&Block, usize, usize) -> Option<&[f32]>,
+        of: Numbers,
     ) -> Gathered {
         let joints = const { C.ilog2() as usize };
         // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
@@ -332,7 +335,7 @@ impl Store {
         }
         for corner in 0..C {
             let (block, place) = (blocks[corner & odd], (corner ^ odd) & places);
-            match block.and_then(|block| surplus_at(block, place, W)) {
+            match block.and_then(|block| block.surplus_at(of, place, W)) {
                 Some(surplus) => {
                     gathered.any = true;
                     numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());
