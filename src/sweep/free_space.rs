@@ -172,12 +172,6 @@ impl FreeGaps {
     pub fn points(&self) -> Range<usize> {
         self.first..self.first + self.bounds.len()
     }
-
-    /// Number of points that are skipped.
-    #[must_use]
-    pub fn skipped(&self) -> usize {
-        self.points().filter(|&point| self.gap(point).is_some()).count()
-    }
 }
 
 impl Block {

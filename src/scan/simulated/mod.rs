@@ -87,12 +87,6 @@ impl SimulatedRig {
         )
     }
 
-    /// Contact nodes that touch the block now.
-    #[must_use]
-    pub fn touching(&self) -> usize {
-        self.contacts.iter().filter(|contact| contact.touches()).count()
-    }
-
     fn step(&mut self, torque: &JointVector, time: f64) {
         let mut load = self.chain.gravity_torque(&self.pose, self.gravity);
         for (node, contact) in self.contacts.iter_mut().enumerate() {
