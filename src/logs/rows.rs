@@ -183,6 +183,9 @@ impl<'a, R: BufRead> Rows<'a, R> {
             return " (columns seem to be separated by semicolons: set `delimiter = \";\"`, and `decimal = \",\"` where \
                     decimals are commas)";
         }
+        if self.mapping.table.delimiter != '\t' && field.contains('\t') {
+            return " (columns seem to be separated by tabs: set `delimiter = \"\\t\"`)";
+        }
         let comma_number = self.mapping.table.decimal == '.' && number(field, ',').is_some();
         if comma_number { " (decimals seem to be commas: set `decimal = \",\"`)" } else { "" }
     }
@@ -204,7 +207,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
                 match (found.next(), found.next()) {
                     (Some(column), None) => Ok(column),
                     (None, _) => {
-                        Err(self.error(format!("no column is called `{}`; there are {}", escaped(name), listed(names))))
+                        let hint = names.first().map_or("", |field| self.hint(field));
+                        let what =
+                            format!("no column is called `{}`; there are {}{hint}", escaped(name), listed(names));
+                        Err(self.error(what))
                     }
                     (Some(first), Some(second)) => Err(self.error(format!(
                         "columns {} and {} are both called `{name}`: give the number of the one that is meant",

@@ -264,7 +264,7 @@ impl ScanLog {
         if lines.next(&mut text)?.is_some_and(|line| line != SIGNATURE.as_bytes()) {
             let what = format!(
                 "not a scan log (its first line is not `{SIGNATURE}`); of other tables `haptize gridize` makes a dataset, by a \
-                 column mapping (--columns)"
+                 column mapping (--columns), which `haptize gridize --guess LOG` writes"
             );
             return Err(Error::at(path, what));
         }
