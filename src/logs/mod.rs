@@ -169,7 +169,7 @@ fn remedy(reason: Reason, of_robot: bool, mapping: &Mapping) -> String {
         Reason::TimeGoesBack => "the clock was set meanwhile: cut off what comes before or behind that".into(),
         _ if of_robot => format!(
             "each message has to give position and effort of all joints, {}: choose those of one publisher by a column \
-             mapping (--columns)",
+             mapping (--columns) with `bad_rows = \"drop\"`",
             joints()
         ),
         _ => "correct the log or the mapping, or cut off the part that is not a measurement".into(),
