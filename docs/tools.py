@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Has other programs open what haptize writes, and prints a row for each: the table of docs/tools.md.
+"""Has other programs open what haptize writes, and prints a row for each (docs/tools.md).
 
     pip install numpy h5py xarray h5netcdf netCDF4 meshio vtk mcap mcap-ros2-support rosbags rerun-sdk
     python docs/tools.py [PROGRAM]          by default `haptize` on the path

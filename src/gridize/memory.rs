@@ -63,7 +63,7 @@ impl ForceHistory {
     }
 
     /// Configuration and torque of row `row`, of `joints` numbers each.
-    pub(super) fn row(&self, row: usize, joints: usize) -> [JointVector; 2] {
+    pub(crate) fn row(&self, row: usize, joints: usize) -> [JointVector; 2] {
         [&self.configurations, &self.torques].map(|all| JointVector::from_slice(&all[row * joints..(row + 1) * joints]))
     }
 }
@@ -139,18 +139,16 @@ fn scale(dataset: &mut Dataset, scale: f64) {
 /// The histories as the potential of `dataset` has them.
 fn stretches(dataset: &Dataset, histories: &[ForceHistory]) -> Result<Vec<Stretch>, Error> {
     let joints = dataset.grid.joints();
-    let mut slopes = JointVector::zeros(joints);
-    slopes.fill(1.0);
+    let slopes = std::iter::repeat_n(1.0, joints).collect();
     let field = TorqueField::interpolated(dataset, Interpolation::Potential, THRESHOLD, &slopes);
     let field = field.map_err(|error| error.within("the gridized torque cannot be interpolated"))?;
     let of = |history: &ForceHistory| {
         let mut stretch =
             Stretch { times: history.times.clone(), counts: history.counts.clone(), ..Stretch::default() };
         let mut inside = Vec::new();
-        for (q, torque) in history.configurations.chunks_exact(joints).zip(history.torques.chunks_exact(joints)) {
-            let sample = field.sample(q);
-            let size = sample.torque.norm();
-            let along: f64 = sample.torque.iter().zip(torque).map(|(elastic, measured)| elastic * measured).sum();
+        for [q, torque] in (0..history.times.len()).map(|row| history.row(row, joints)) {
+            let sample = field.sample(&q);
+            let (size, along) = (sample.torque.norm(), sample.torque.dot(&torque));
             stretch.roots.push((2.0 * sample.energy.max(0.0)).sqrt());
             stretch.elastic.push(size);
             stretch.measured.push(if size > 0.0 { along / size } else { 0.0 });

@@ -249,7 +249,7 @@ impl ScanLog {
         if lines.next(&mut text)?.is_some_and(|line| line != SIGNATURE.as_bytes()) {
             let what = format!(
                 "not a scan log (its first line is not `{SIGNATURE}`); of other tables `haptize gridize` makes a dataset, by a \
-                 column mapping (--columns)"
+                 column mapping (--columns), which `haptize gridize --guess LOG` writes"
             );
             return Err(Error::at(path, what));
         }
@@ -344,10 +344,7 @@ fn row(line: &str, joints: usize) -> Result<ScanRow, String> {
         let wrong = || format!("column {} holds `{}`, not a finite number", column + 1, fields[column]);
         value.filter(|value| value.is_finite()).ok_or_else(wrong)
     };
-    let vector = |first: usize| {
-        let values: Result<Vec<f64>, String> = (first..first + joints).map(number).collect();
-        values.map(|values| JointVector::from_slice(&values))
-    };
+    let vector = |first: usize| (first..first + joints).map(number).collect::<Result<JointVector, String>>();
     let whole = |column: usize| {
         let wrong = || format!("column {} holds `{}`, not a whole number", column + 1, fields[column]);
         fields[column].parse::<u32>().map_err(|_| wrong())

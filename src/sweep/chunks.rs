@@ -170,7 +170,6 @@ impl Sweep<'_> {
         let mut course = Course {
             sweep: self,
             free_space: self.free_space(),
-            slab: 0..0,
             gaps: None,
             cut: resumed,
             chunks: VecDeque::new(),
@@ -207,8 +206,7 @@ struct Course<'c, 'r> {
     sweep: &'c Sweep<'c>,
     run: &'c mut Run<'r>,
     free_space: Option<FreeSpace<'c>>,
-    /// Points whose gaps are looked up, and what was found.
-    slab: Range<usize>,
+    /// What was found of the gaps of some points.
     gaps: Option<FreeGaps>,
     /// Number of points that were cut off the sweep's so far.
     cut: usize,
@@ -259,12 +257,11 @@ impl Course<'_, '_> {
     fn look_for_free_space(&mut self) -> Result<(), Error> {
         let first = self.rest().start;
         if let Some(free_space) = &self.free_space
-            && !self.slab.contains(&first)
+            && self.gaps.as_ref().is_none_or(|gaps| !gaps.points().contains(&first))
         {
             // Of two slabs only one is kept.
             self.gaps = None;
-            self.slab = free_space.slab(first);
-            self.gaps = Some(self.sweep.gaps(free_space, self.slab.clone())?);
+            self.gaps = Some(self.sweep.gaps(free_space, free_space.slab(first))?);
         }
         Ok(())
     }
@@ -274,7 +271,7 @@ impl Course<'_, '_> {
         let (rest, most) = (self.rest(), self.size.size);
         let (mut solved, mut free_gaps) = (0, Vec::new());
         let end = rest.end.min(rest.start.saturating_add(together(most)));
-        let end = if self.free_space.is_some() { end.min(self.slab.end) } else { end };
+        let end = self.gaps.as_ref().map_or(end, |gaps| end.min(gaps.points().end));
         let mut point = rest.start;
         while point < end {
             let free_gap = self.gaps.as_ref().and_then(|gaps| gaps.gap(point));

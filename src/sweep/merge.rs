@@ -45,18 +45,13 @@ impl Contents {
         Ok(Self { path: path.into(), found, map })
     }
 
-    /// Whether all points of the shard are there, and nothing is damaged.
-    fn is_whole(&self) -> bool {
-        self.found.is_whole(&self.map)
-    }
-
     /// Whether this is the whole shard that `binding` is of.
     pub fn is_whole_of(&self, binding: &Binding) -> Result<bool, Error> {
         let its = &self.found.binding;
         let different = binding.other_sweep(its).or((binding.shard != its.shard).then_some("another shard"));
         match different {
             Some(difference) => Err(other_part(&self.path, difference)),
-            None => Ok(self.is_whole()),
+            None => Ok(self.found.is_whole(&self.map)),
         }
     }
 }
@@ -91,7 +86,7 @@ impl Merge {
                 return Err(different(&file, path, difference));
             }
             let Shard { index, .. } = shard.found.binding.shard;
-            if !shard.is_whole() {
+            if !shard.found.is_whole(&shard.map) {
                 notes.push(format!("{} is damaged: shard {index} counts as missing", file.display()));
             } else if let Some(kept) = shards.get(&index) {
                 notes.push(format!("shard {index} is there twice: {} is taken", kept.path.display()));

@@ -71,9 +71,7 @@ impl HeldNodes {
     }
 
     fn spacing(&self, level: u32) -> JointVector {
-        let mut spacing = JointVector::zeros(self.space.joints());
-        spacing.iter_mut().enumerate().for_each(|(a, step)| *step = self.space.step(level, a));
-        spacing
+        (0..self.space.joints()).map(|a| self.space.step(level, a)).collect()
     }
 }
 
