@@ -61,17 +61,20 @@ impl Content {
     fn of(start: &[u8]) -> Option<Self> {
         let holds = |word: &[u8]| start.windows(word.len()).any(|part| part == word);
         let begins = |magic: &[u8]| start.starts_with(magic);
-        let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
-        // A text may name haptize, and be the work of a person: a scene, a script.
-        let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg") || begins(b"GIF89a"));
+        let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"\x07\0\0\0haptize");
+        // Each by the mark that haptize sets: what merely names haptize, or holds torques, may be the work of a person.
+        let figure = begins(b"\x89PNG") && holds(b"Software\0haptize")
+            || begins(b"<svg") && holds(b">\n<!-- haptize -->\n")
+            || begins(b"GIF89a") && holds(b"\x07haptize");
         let page = begins(b".ie ") && holds(b".TH haptize")
             || begins(HEADING.as_bytes())
             || begins(page::OPENING.as_bytes())
             || begins(vtk::OPENING.as_bytes())
             || begins(PLAN.as_bytes());
-        let archive = begins(b"PK") && holds(b"torque.npy");
+        let archive = begins(b"PK") && holds(b"provenance.npy");
         let shape = begins(OBJ.as_bytes());
-        let hdf5 = begins(b"\x89HDF") && holds(b"torque");
+        let names: [&[u8]; 4] = [b"torque", b"joint_units", b"scene", b"provenance"];
+        let hdf5 = begins(b"\x89HDF") && names.into_iter().all(holds);
         match () {
             () if may_be_dataset(start) => Some(Self::Dataset),
             () if log => Some(Self::Log),
@@ -99,9 +102,14 @@ pub fn is_mcap(path: &Path) -> bool {
 fn is_table(start: &[u8]) -> bool {
     let line =
         str::from_utf8(start.split(|byte| *byte == b'\n').next().unwrap_or_default()).unwrap_or_default().trim_end();
-    let openings = ["time [s],hand ", "time [s],node,", "point (row of the other file", "study,series,setting,"];
-    let is_dataset = line.contains(",status") && (line.contains("],torque ") || line.contains("],force "));
-    is_dataset || openings.iter().any(|opening| line.starts_with(opening))
+    let openings = [
+        "time [s],node,x [m],y [m],z [m]",
+        "point (row of the other file from 0),node,",
+        "study,series,setting,value,points,solved,size [B],cost [1],",
+    ];
+    let is_trace = line.starts_with("time [s],hand ") && line.contains("],device ") && line.contains("],proxy ");
+    let is_dataset = line.contains(",status (0 free; 1 contact; ");
+    is_trace || is_dataset || openings.iter().any(|opening| line.starts_with(opening))
 }
 
 /// A file that is replaced.
@@ -298,9 +306,15 @@ impl Describe for Overwritten {
 /// Checks that `folder`, in which `output` is to be, can be written to: before an hour's work, not after it.
 fn probe(output: &Path, folder: &Path) -> Result<(), Failure> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let refused = |why: String| format!("{}: cannot be written: {why}", output.display());
+    match fs::symlink_metadata(output) {
+        Err(error) if error.kind() == io::ErrorKind::InvalidFilename => {
+            return Err(refused(format!("{error}; choose a shorter name")).into());
+        }
+        _ => {}
+    }
     tempfile::tempfile_in(folder).map(drop).map_err(|error| {
-        let (output, folder) = (output.display(), folder.display());
-        format!("{output}: cannot be written: {folder}: {error}; make the folder, or choose another output (-o)").into()
+        refused(format!("{}: {error}; make the folder, or choose another output (-o)", folder.display())).into()
     })
 }
 
@@ -333,6 +347,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::{Axis, Dataset, Format, Grid};
     use std::time::Duration;
 
     #[test]
@@ -349,21 +364,47 @@ mod tests {
             "time [s],q_a [rad],tau_a [N m]\n",
             // A motion that was recorded: without the first line of a plan.
             "time [s],a [rad],lift [m]\n",
+            "time [s],hand x,hand y,hand z\n",
+            "a [rad],torque a [N m],status\n",
+            "study,series,setting,mine\n",
+            "<svg><!-- drawn over a plot of haptize --></svg>",
+            "\x07\0\0\0\0\0\0\0{\"weights\":{\"dtype\":\"F32\"",
+            "\x07\0\0\0\0\0\0\0{\"__metadata__\":{\"format\":\"pt\"}",
+            "PK\x03\x04 torque.npy",
         ] {
             assert_eq!(Content::of(mine.as_bytes()), None, "{mine}");
         }
         for ours in [
             ".ie \\n(.g .ds Aq \\(aq\n.TH haptize-new 1\n",
             "# The paper's figures and numbers, remade by haptize\n",
-            "time [s],hand a [rad],device a [rad]\n",
+            "time [s],hand a [rad],device a [rad],proxy a [rad],\n",
             "time [s],node,x [m],y [m],z [m]\n",
-            "a [rad],lift [m],torque a [N m],force lift [N],energy [J],gap [m],status\r\n",
             "point (row of the other file from 0),node,force x [N]\n",
-            "study,series,setting,value\n",
+            "study,series,setting,value,points,solved,size [B],cost [1],rms [N],worst [N],relative rms [1]\n",
             "# a plan of haptize\ntime [s],a [rad],lift [m]\n",
         ] {
             assert_eq!(Content::of(ours.as_bytes()), Some(Content::Product), "{ours}");
         }
+    }
+
+    #[test]
+    fn what_is_exported_is_known_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let axis = |name: &str| Axis { name: name.into(), unit: "rad".into(), start: 0.0, step: 1.0, count: 2 };
+        let grid = Grid { axes: vec![axis("a"), axis("b")] };
+        let dataset = Dataset::bare(grid, vec![0.5; 8], vec![1; 4]);
+        let known = |file: PathBuf| {
+            let start = fs::read(file).unwrap();
+            Content::of(&start[..start.len().min(START as usize)])
+        };
+        for format in [Format::Npz, Format::Hdf5, Format::Csv, Format::Vti] {
+            let file = folder.path().join("x").with_extension(format.extension());
+            dataset.export(&file, format).unwrap();
+            assert_eq!(known(file), Some(Content::Product), "{format:?}");
+        }
+        let file = folder.path().join("x.haptize");
+        dataset.save(&file).unwrap();
+        assert_eq!(known(file), Some(Content::Dataset));
     }
 
     #[test]

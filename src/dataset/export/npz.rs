@@ -81,6 +81,8 @@ impl<W: Seek> Seek for Quiet<W> {
 
 fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Result<()> {
     let grid = &dataset.grid;
+    // First: by it the archive is known for one of haptize.
+    texts(&mut zip, "provenance", &[], vec![serde_json::to_string(&dataset.provenance)?])?;
     for (_, tensor) in file::arrays(dataset) {
         let (name, shape) = (tensor.name, &tensor.shape);
         match tensor.dtype {
@@ -106,7 +108,6 @@ fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Resul
     texts(&mut zip, "units", &[units.len(), 2], units.into_iter().flatten().collect())?;
     texts(&mut zip, "axes", &[axes.len(), 2], axes.into_iter().flatten().collect())?;
     texts(&mut zip, "scene", &[], vec![dataset.scene.clone()])?;
-    texts(&mut zip, "provenance", &[], vec![serde_json::to_string(&dataset.provenance)?])?;
     zip.finish()?;
     Ok(())
 }
