@@ -11,8 +11,8 @@ use crate::{
     names::counted,
     paper::HEADING,
     render::recording::SIGNATURE as SESSION,
-    report::page,
-    scan::{PLAN, SIGNATURE},
+    report::{mcap::LIBRARY as SESSION_LIBRARY, page},
+    scan::{PLAN, PLAN_LIBRARY, SIGNATURE},
     scene::Scene,
     twin::OBJ,
     vtk,
@@ -28,9 +28,6 @@ use std::{
 
 /// Bytes at the start of a file by which those of haptize are known.
 const START: u64 = 1024;
-
-/// How logs of scans and records of sessions begin.
-const LOGS: [&[u8]; 2] = [SIGNATURE.as_bytes(), SESSION.as_bytes()];
 
 /// Whether the command line has `--force`.
 static FORCED: AtomicBool = AtomicBool::new(false);
@@ -50,8 +47,10 @@ pub fn is_forced() -> bool {
 pub enum Content {
     /// A dataset.
     Dataset,
-    /// The log of a scan, or the record of a session.
-    Log,
+    /// The log of a scan.
+    Scan,
+    /// The record of a session.
+    Session,
     /// What is made of these again: tables, archives, figures, pages.
     Product,
 }
@@ -61,7 +60,10 @@ impl Content {
     fn of(start: &[u8]) -> Option<Self> {
         let holds = |word: &[u8]| start.windows(word.len()).any(|part| part == word);
         let begins = |magic: &[u8]| start.starts_with(magic);
-        let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"\x07\0\0\0haptize");
+        let mcap = |library: &str| {
+            let length = (library.len() as u32).to_le_bytes();
+            begins(b"\x89MCAP") && holds(&[&length, library.as_bytes()].concat())
+        };
         // Each by the mark that haptize sets: what merely names haptize, or holds torques, may be the work of a person.
         let figure = begins(b"\x89PNG") && holds(b"Software\0haptize")
             || begins(b"<svg") && holds(b">\n<!-- haptize -->\n")
@@ -70,14 +72,16 @@ impl Content {
             || begins(HEADING.as_bytes())
             || begins(page::OPENING.as_bytes())
             || begins(vtk::OPENING.as_bytes())
-            || begins(PLAN.as_bytes());
+            || begins(PLAN.as_bytes())
+            || mcap(PLAN_LIBRARY);
         let archive = begins(b"PK") && holds(b"provenance.npy");
         let shape = begins(OBJ.as_bytes());
         let names: [&[u8]; 4] = [b"torque", b"joint_units", b"scene", b"provenance"];
         let hdf5 = begins(b"\x89HDF") && names.into_iter().all(holds);
         match () {
             () if may_be_dataset(start) => Some(Self::Dataset),
-            () if log => Some(Self::Log),
+            () if begins(SIGNATURE.as_bytes()) => Some(Self::Scan),
+            () if begins(SESSION.as_bytes()) || mcap(SESSION_LIBRARY) => Some(Self::Session),
             () if figure || page || archive || shape || hdf5 || is_table(start) => Some(Self::Product),
             () => None,
         }
@@ -86,7 +90,8 @@ impl Content {
     fn name(self) -> &'static str {
         match self {
             Self::Dataset => "a dataset",
-            Self::Log => "a log of haptize",
+            Self::Scan => "the log of a scan",
+            Self::Session => "the record of a session",
             Self::Product => "a table or figure of haptize",
         }
     }
@@ -411,7 +416,7 @@ mod tests {
     fn what_another_command_has_written_meanwhile_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let [log, second, third] = ["log.csv", "log-2.csv", "log-3.csv"].map(|name| folder.path().join(name));
-        let seen = || check(&log, Content::Log, []).ok().flatten();
+        let seen = || check(&log, Content::Session, []).ok().flatten();
         assert_eq!(untaken(&log, seen().as_ref()), log);
         let before = seen();
         fs::write(&log, SESSION).unwrap();

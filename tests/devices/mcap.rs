@@ -23,7 +23,7 @@ use std::{
 /// A file of `states`, each with its topic.
 fn file(folder: &Path, name: &str, states: &[(&str, JointState)]) -> PathBuf {
     let path = folder.join(name);
-    let mut writer = MessageWriter::new(fs::File::create(&path).unwrap()).unwrap();
+    let mut writer = MessageWriter::new(fs::File::create(&path).unwrap(), "haptize").unwrap();
     let mut known: BTreeMap<&str, u16> = BTreeMap::new();
     for (topic, state) in states {
         let number = *known.entry(topic).or_insert_with(|| writer.topic::<JointState>(topic).unwrap());
