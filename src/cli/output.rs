@@ -7,7 +7,8 @@ use super::{
     tell,
 };
 use crate::{
-    dataset::{may_be_dataset, replace_file, resolved},
+    Error,
+    dataset::{may_be_dataset, resolved, rewrite_file},
     names::counted,
     paper::HEADING,
     render::recording::SIGNATURE as SESSION,
@@ -20,7 +21,7 @@ use crate::{
 use serde::Serialize;
 use std::{
     fs::{self, File},
-    io::{self, Read, Write as _},
+    io::{self, Read},
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
     time::SystemTime,
@@ -221,7 +222,7 @@ pub fn replaceable(output: &Path) -> Result<Option<(PathBuf, fs::Metadata)>, Fai
 /// When that makes no valid scene, or cannot be written.
 pub fn rewrite(scene: &Scene, text: &str) -> Result<String, Failure> {
     Scene::parse(text, &scene.path)?;
-    replace_file(&scene.path, |file| file.write_all(text.as_bytes()))?;
+    rewrite_file(&scene.path, &scene.text, text).map_err(|error| Error::at(&scene.path, error))?;
     Ok(scene.path.display().to_string())
 }
 

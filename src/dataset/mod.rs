@@ -26,7 +26,7 @@ pub use accuracy::{
     FrictionExcess, GeometryError, IdentifiedFriction, IdentifiedRelaxation, InterpolationError, MeasuredError,
 };
 pub(crate) use atomic::BUFFER;
-pub use atomic::{Replacement, discard_unfinished, replace_file, resolved};
+pub use atomic::{Replacement, discard_unfinished, replace_file, resolved, rewrite_file};
 pub use column::Column;
 pub use export::Format;
 pub(crate) use file::{
