@@ -59,11 +59,29 @@ pub(crate) fn duration(seconds: f64) -> String {
     }
 }
 
-/// Checks that `name` may be printed in a line.
+/// Returns the first of `names`, as many as a message has room for.
+pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    const MOST_NAMES: usize = 20;
+    const MOST_CHARACTERS: usize = 40;
+    let shown = |name: &S| match name.as_ref().char_indices().nth(MOST_CHARACTERS) {
+        Some((end, _)) => format!("{}…", &name.as_ref()[..end]),
+        None => name.as_ref().to_owned(),
+    };
+    let mut list = names.iter().take(MOST_NAMES).map(shown).collect::<Vec<_>>().join(", ");
+    if names.len() > MOST_NAMES {
+        list.push_str(&format!(" and {} more", names.len() - MOST_NAMES));
+    }
+    list
+}
+
+/// Checks that `name` may be printed in a line, and is seen there.
 ///
 /// # Errors
 /// Problem, in words.
 pub(crate) fn check(name: &str) -> Result<(), String> {
+    if name.trim().is_empty() {
+        return Err("a name is blank: give it letters or digits".into());
+    }
     match name.chars().find(|c| is_disruptive(*c)) {
         None => Ok(()),
         Some(c) => Err(format!(
@@ -92,7 +110,10 @@ mod tests {
             // As a reader of JSON has it.
             assert_eq!(serde_json::from_str::<String>(&format!("\"{spelt}\"")).unwrap(), name);
         }
-        for name in ["", "joint 1", "Gelenk_ä", "関節", "مفصل", "a\\u000a", "😀"] {
+        for name in ["", " ", "\u{2003}"] {
+            assert!(check(name).unwrap_err().contains("blank"), "{name:?}");
+        }
+        for name in ["joint 1", "Gelenk_ä", "関節", "مفصل", "a\\u000a", "😀"] {
             assert!(matches!(escaped(name), Cow::Borrowed(same) if same == name), "{name}");
             assert_eq!(check(name), Ok(()));
         }

@@ -18,7 +18,7 @@ use crate::{
     },
     input,
     logs::{Effort, ImportProgress, ImportReport, Imported, Mapping, import, total_size},
-    names::counted,
+    names::{counted, listed},
     proxy::Chain,
     report::{FIGURES as FELT, gridized::gridized, hysteresis::hysteresis, write_both, write_figures},
     ros::{JointStateTable, is_mcap},
@@ -350,7 +350,7 @@ fn mapping(arguments: &Arguments) -> Result<Option<Mapping>, Failure> {
     };
     let table = JointStateTable::open(log, topic)?;
     if table.joints().len() > MAX_AXES {
-        let names = table.joints().join(", ");
+        let names = listed(table.joints());
         let (file, many) = (log.display(), table.joints().len());
         return Err(format!(
             "{file}: {} has {many} joints ({names}), more than {MAX_AXES}: choose some by a column mapping \

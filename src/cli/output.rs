@@ -7,12 +7,13 @@ use super::{
     tell,
 };
 use crate::{
-    dataset::{may_be_dataset, replace_file, resolved},
+    Error,
+    dataset::{may_be_dataset, resolved, rewrite_file},
     names::counted,
     paper::HEADING,
     render::recording::SIGNATURE as SESSION,
-    report::page,
-    scan::{PLAN, SIGNATURE},
+    report::{mcap::LIBRARY as SESSION_LIBRARY, page},
+    scan::{PLAN, PLAN_LIBRARY, SIGNATURE},
     scene::Scene,
     twin::OBJ,
     vtk,
@@ -20,7 +21,7 @@ use crate::{
 use serde::Serialize;
 use std::{
     fs::{self, File},
-    io::{self, Read, Write as _},
+    io::{self, Read},
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
     time::SystemTime,
@@ -28,9 +29,6 @@ use std::{
 
 /// Bytes at the start of a file by which those of haptize are known.
 const START: u64 = 1024;
-
-/// How logs of scans and records of sessions begin.
-const LOGS: [&[u8]; 2] = [SIGNATURE.as_bytes(), SESSION.as_bytes()];
 
 /// Whether the command line has `--force`.
 static FORCED: AtomicBool = AtomicBool::new(false);
@@ -50,8 +48,10 @@ pub fn is_forced() -> bool {
 pub enum Content {
     /// A dataset.
     Dataset,
-    /// The log of a scan, or the record of a session.
-    Log,
+    /// The log of a scan.
+    Scan,
+    /// The record of a session.
+    Session,
     /// What is made of these again: tables, archives, figures, pages.
     Product,
 }
@@ -61,20 +61,28 @@ impl Content {
     fn of(start: &[u8]) -> Option<Self> {
         let holds = |word: &[u8]| start.windows(word.len()).any(|part| part == word);
         let begins = |magic: &[u8]| start.starts_with(magic);
-        let log = LOGS.iter().any(|opening| begins(opening)) || begins(b"\x89MCAP") && holds(b"haptize");
-        // A text may name haptize, and be the work of a person: a scene, a script.
-        let figure = holds(b"haptize") && (begins(b"\x89PNG") || begins(b"<svg") || begins(b"GIF89a"));
+        let mcap = |library: &str| {
+            let length = (library.len() as u32).to_le_bytes();
+            begins(b"\x89MCAP") && holds(&[&length, library.as_bytes()].concat())
+        };
+        // Each by the mark that haptize sets: what merely names haptize, or holds torques, may be the work of a person.
+        let figure = begins(b"\x89PNG") && holds(b"Software\0haptize")
+            || begins(b"<svg") && holds(b">\n<!-- haptize -->\n")
+            || begins(b"GIF89a") && holds(b"\x07haptize");
         let page = begins(b".ie ") && holds(b".TH haptize")
             || begins(HEADING.as_bytes())
             || begins(page::OPENING.as_bytes())
             || begins(vtk::OPENING.as_bytes())
-            || begins(PLAN.as_bytes());
-        let archive = begins(b"PK") && holds(b"torque.npy");
+            || begins(PLAN.as_bytes())
+            || mcap(PLAN_LIBRARY);
+        let archive = begins(b"PK") && holds(b"provenance.npy");
         let shape = begins(OBJ.as_bytes());
-        let hdf5 = begins(b"\x89HDF") && holds(b"torque");
+        let names: [&[u8]; 4] = [b"torque", b"joint_units", b"scene", b"provenance"];
+        let hdf5 = begins(b"\x89HDF") && names.into_iter().all(holds);
         match () {
             () if may_be_dataset(start) => Some(Self::Dataset),
-            () if log => Some(Self::Log),
+            () if begins(SIGNATURE.as_bytes()) => Some(Self::Scan),
+            () if begins(SESSION.as_bytes()) || mcap(SESSION_LIBRARY) => Some(Self::Session),
             () if figure || page || archive || shape || hdf5 || is_table(start) => Some(Self::Product),
             () => None,
         }
@@ -83,7 +91,8 @@ impl Content {
     fn name(self) -> &'static str {
         match self {
             Self::Dataset => "a dataset",
-            Self::Log => "a log of haptize",
+            Self::Scan => "the log of a scan",
+            Self::Session => "the record of a session",
             Self::Product => "a table or figure of haptize",
         }
     }
@@ -99,9 +108,14 @@ pub fn is_mcap(path: &Path) -> bool {
 fn is_table(start: &[u8]) -> bool {
     let line =
         str::from_utf8(start.split(|byte| *byte == b'\n').next().unwrap_or_default()).unwrap_or_default().trim_end();
-    let openings = ["time [s],hand ", "time [s],node,", "point (row of the other file", "study,series,setting,"];
-    let is_dataset = line.contains(",status") && (line.contains("],torque ") || line.contains("],force "));
-    is_dataset || openings.iter().any(|opening| line.starts_with(opening))
+    let openings = [
+        "time [s],node,x [m],y [m],z [m]",
+        "point (row of the other file from 0),node,",
+        "study,series,setting,value,points,solved,size [B],cost [1],",
+    ];
+    let is_trace = line.starts_with("time [s],hand ") && line.contains("],device ") && line.contains("],proxy ");
+    let is_dataset = line.contains(",status (0 free; 1 contact; ");
+    is_trace || is_dataset || openings.iter().any(|opening| line.starts_with(opening))
 }
 
 /// A file that is replaced.
@@ -208,7 +222,7 @@ pub fn replaceable(output: &Path) -> Result<Option<(PathBuf, fs::Metadata)>, Fai
 /// When that makes no valid scene, or cannot be written.
 pub fn rewrite(scene: &Scene, text: &str) -> Result<String, Failure> {
     Scene::parse(text, &scene.path)?;
-    replace_file(&scene.path, |file| file.write_all(text.as_bytes()))?;
+    rewrite_file(&scene.path, &scene.text, text).map_err(|error| Error::at(&scene.path, error))?;
     Ok(scene.path.display().to_string())
 }
 
@@ -298,9 +312,15 @@ impl Describe for Overwritten {
 /// Checks that `folder`, in which `output` is to be, can be written to: before an hour's work, not after it.
 pub fn probe(output: &Path, folder: &Path) -> Result<(), Failure> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let refused = |why: String| format!("{}: cannot be written: {why}", output.display());
+    match fs::symlink_metadata(output) {
+        Err(error) if error.kind() == io::ErrorKind::InvalidFilename => {
+            return Err(refused(format!("{error}; choose a shorter name")).into());
+        }
+        _ => {}
+    }
     tempfile::tempfile_in(folder).map(drop).map_err(|error| {
-        let (output, folder) = (output.display(), folder.display());
-        format!("{output}: cannot be written: {folder}: {error}; make the folder, or choose another output (-o)").into()
+        refused(format!("{}: {error}; make the folder, or choose another output (-o)", folder.display())).into()
     })
 }
 
@@ -333,6 +353,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::{Axis, Dataset, Format, Grid};
     use std::time::Duration;
 
     #[test]
@@ -349,17 +370,23 @@ mod tests {
             "time [s],q_a [rad],tau_a [N m]\n",
             // A motion that was recorded: without the first line of a plan.
             "time [s],a [rad],lift [m]\n",
+            "time [s],hand x,hand y,hand z\n",
+            "a [rad],torque a [N m],status\n",
+            "study,series,setting,mine\n",
+            "<svg><!-- drawn over a plot of haptize --></svg>",
+            "\x07\0\0\0\0\0\0\0{\"weights\":{\"dtype\":\"F32\"",
+            "\x07\0\0\0\0\0\0\0{\"__metadata__\":{\"format\":\"pt\"}",
+            "PK\x03\x04 torque.npy",
         ] {
             assert_eq!(Content::of(mine.as_bytes()), None, "{mine}");
         }
         for ours in [
             ".ie \\n(.g .ds Aq \\(aq\n.TH haptize-new 1\n",
             "# The paper's figures and numbers, remade by haptize\n",
-            "time [s],hand a [rad],device a [rad]\n",
+            "time [s],hand a [rad],device a [rad],proxy a [rad],\n",
             "time [s],node,x [m],y [m],z [m]\n",
-            "a [rad],lift [m],torque a [N m],force lift [N],energy [J],gap [m],status\r\n",
             "point (row of the other file from 0),node,force x [N]\n",
-            "study,series,setting,value\n",
+            "study,series,setting,value,points,solved,size [B],cost [1],rms [N],worst [N],relative rms [1]\n",
             "# a plan of haptize\ntime [s],a [rad],lift [m]\n",
         ] {
             assert_eq!(Content::of(ours.as_bytes()), Some(Content::Product), "{ours}");
@@ -367,10 +394,30 @@ mod tests {
     }
 
     #[test]
+    fn what_is_exported_is_known_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let axis = |name: &str| Axis { name: name.into(), unit: "rad".into(), start: 0.0, step: 1.0, count: 2 };
+        let grid = Grid { axes: vec![axis("a"), axis("b")] };
+        let dataset = Dataset::bare(grid, vec![0.5; 8], vec![1; 4]);
+        let known = |file: PathBuf| {
+            let start = fs::read(file).unwrap();
+            Content::of(&start[..start.len().min(START as usize)])
+        };
+        for format in [Format::Npz, Format::Hdf5, Format::Csv, Format::Vti] {
+            let file = folder.path().join("x").with_extension(format.extension());
+            dataset.export(&file, format).unwrap();
+            assert_eq!(known(file), Some(Content::Product), "{format:?}");
+        }
+        let file = folder.path().join("x.haptize");
+        dataset.save(&file).unwrap();
+        assert_eq!(known(file), Some(Content::Dataset));
+    }
+
+    #[test]
     fn what_another_command_has_written_meanwhile_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let [log, second, third] = ["log.csv", "log-2.csv", "log-3.csv"].map(|name| folder.path().join(name));
-        let seen = || check(&log, Content::Log, []).ok().flatten();
+        let seen = || check(&log, Content::Session, []).ok().flatten();
         assert_eq!(untaken(&log, seen().as_ref()), log);
         let before = seen();
         fs::write(&log, SESSION).unwrap();

@@ -389,7 +389,16 @@ fn perform(
     on_tick: &mut dyn FnMut(&Tick),
 ) -> Result<Played, Failure> {
     let motion = motion::named(setup, dataset, &arguments.motion, arguments.topic.as_deref())?;
-    let seconds = arguments.seconds.unwrap_or_else(|| motion.duration());
+    let (begin, end) = (motion.begin(), motion.duration());
+    let seconds = arguments.seconds.unwrap_or(end);
+    if end > begin && (begin >= seconds || end <= 0.0) {
+        return Err(format!(
+            "{}: the motion goes from {begin} s to {end} s, and a session begins at 0 s and ends at {seconds} s: nothing of \
+             it would be felt; let its times begin at 0",
+            arguments.motion
+        )
+        .into());
+    }
     if arguments.seconds.is_none() && seconds == 0.0 {
         let what = "the motion is a single position: give --seconds how long it is held, or a later position";
         return Err(format!("{}: {what}", arguments.motion).into());
@@ -577,7 +586,7 @@ impl Outputs {
             let earlier = output::check(file, content, inputs.clone())?;
             filled.keep_apart(file).map(|()| earlier)
         };
-        let replaced = check(&arguments.record, Content::Log)?;
+        let replaced = check(&arguments.record, Content::Session)?;
         let earlier_page = check(&arguments.html, Content::Product)?;
         Ok(Self { filled, replaced, earlier_page, filled_series })
     }

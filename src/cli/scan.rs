@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         None => PathBuf::from(arguments.scene.file_name().ok_or("the scene's path names no file; give -o")?)
             .with_extension("csv"),
     };
-    output::check(&output, Content::Log, [arguments.scene.as_path()])?;
+    output::check(&output, Content::Scan, [arguments.scene.as_path()])?;
     let stop = if arguments.device.is_some() { interrupt::stop_flag_of_device() } else { interrupt::stop_flag() };
     let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}");
     let mut progress = |progress: ScanProgress| {
@@ -167,8 +167,7 @@ impl Describe for Scanned {
 
 /// Writes the plan of `scene` to `file`.
 fn write_plan(scene: &ScanScene, arguments: &Arguments, file: &Path) -> Result<Report, Failure> {
-    let content = if output::is_mcap(file) { Content::Log } else { Content::Product };
-    let replaced = output::check(file, content, [arguments.scene.as_path()])?;
+    let replaced = output::check(file, Content::Product, [arguments.scene.as_path()])?;
     let control = &scene.scan.control;
     let dwell = arguments.dwell.unwrap_or(control.window + control.average);
     if !(dwell > 0.0 && dwell <= LONGEST) {

@@ -88,6 +88,19 @@ pub fn replace_file(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io
     replacement.finish()
 }
 
+/// Replaces the text file at `path`, which held `before` when it was read, by `text`.
+///
+/// # Errors
+/// When another program has changed it since; and those of [`replace_file`].
+pub fn rewrite_file(path: &Path, before: &str, text: &str) -> io::Result<()> {
+    if fs::read(path).is_ok_and(|there| there != before.as_bytes()) {
+        let what = "another program has changed it since it was read, and nothing is written: read it again, or move it \
+                    away";
+        return Err(io::Error::other(what));
+    }
+    replace_file(path, |file| file.write_all(text.as_bytes()))
+}
+
 /// A file that is being written and has not taken its name yet. Dropped, it leaves nothing.
 pub struct Replacement {
     path: PathBuf,

@@ -170,9 +170,12 @@ pub(super) fn bytes(dataset: &Dataset) -> usize {
     arrays(dataset).map(|(_, tensor)| tensor.bytes()).sum()
 }
 
-/// Whether a file that begins with `start` may be a dataset: it begins with the length of its header, a JSON object.
+/// Whether a file that begins with `start` may be a dataset: its header begins as ours does. Other programs keep
+/// arrays, such as the weights of networks, in files of the same format.
 pub(crate) fn may_be_dataset(start: &[u8]) -> bool {
-    start.len() > LENGTH && start[LENGTH] == b'{' && start[..LENGTH].ends_with(&[0, 0, 0])
+    const BEHIND: &[u8] = br#"","format":"haptize "#;
+    let holds = |at: usize, part: &[u8]| start.get(at..).is_some_and(|rest| rest.starts_with(part));
+    holds(LENGTH, OPENING) && holds(CHECKSUM + NO_CHECKSUM.len(), BEHIND)
 }
 
 /// Checks that a dataset written to `path` replaces a dataset, an empty file, or none.

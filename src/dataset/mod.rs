@@ -26,7 +26,7 @@ pub use accuracy::{
     FrictionExcess, GeometryError, IdentifiedFriction, IdentifiedRelaxation, InterpolationError, MeasuredError,
 };
 pub(crate) use atomic::BUFFER;
-pub use atomic::{Replacement, discard_unfinished, replace_file, resolved};
+pub use atomic::{Replacement, discard_unfinished, replace_file, resolved, rewrite_file};
 pub use column::Column;
 pub use export::Format;
 pub(crate) use file::{
@@ -203,10 +203,12 @@ impl Dataset {
 }
 
 impl Contacts {
-    /// Nodes and forces (three numbers each) of grid point `point`.
+    /// Nodes and forces (three numbers each) of grid point `point`; none where another program has overwritten the
+    /// mapped file, so that its offsets lead nowhere.
     #[must_use]
     pub fn row(&self, point: usize) -> (&[u32], &[f32]) {
-        let (start, end) = (self.offsets[point] as usize, self.offsets[point + 1] as usize);
-        (&self.nodes[start..end], &self.forces[3 * start..3 * end])
+        let [start, end] = [0, 1].map(|next| self.offsets[point + next] as usize);
+        let forces = || self.forces.get(start.checked_mul(3)?..end.checked_mul(3)?);
+        self.nodes.get(start..end).zip(forces()).unwrap_or_default()
     }
 }

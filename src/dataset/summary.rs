@@ -110,7 +110,7 @@ impl Dataset {
             }
         }
         let force = |point| self.forces(point).map(|contact| contact.force.length()).fold(0.0, f64::max);
-        let rows = self.contacts.as_ref().map(|contacts| contacts.offsets.windows(2).map(|pair| pair[1] - pair[0]));
+        let rows = self.contacts.as_ref().map(|_| (0..points).map(|point| self.forces(point).len()));
         let refinement = self.refinement.as_deref().map(Refinement::of);
         Summary {
             axes: self.grid.axes.clone(),
@@ -124,7 +124,7 @@ impl Dataset {
                 .as_ref()
                 .map(|all| converged().map(|point| all[point].into()).fold(0.0, f64::max)),
             contacts: self.contacts.as_ref().map(|contacts| contacts.nodes.len()),
-            max_contacts: rows.map(|rows| rows.max().unwrap_or(0) as usize),
+            max_contacts: rows.map(|rows| rows.max().unwrap_or(0)),
             max_force: self.contacts.as_ref().map(|_| converged().map(force).fold(0.0, f64::max)),
             surface: self.surface.as_ref().map(|surface| [surface.nodes.len() / 3, surface.triangles.len() / 3]),
             bytes: super::file::bytes(self) + refinement.as_ref().map_or(0, |refinement| refinement.bytes),

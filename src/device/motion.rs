@@ -143,6 +143,12 @@ impl Motion {
         self.waypoints.first().map_or(0, |point| point.q.len())
     }
 
+    /// When the motion begins (s); before it rests.
+    #[must_use]
+    pub fn begin(&self) -> f64 {
+        self.waypoints.first().map_or(0.0, |point| point.time)
+    }
+
     /// When the motion has come to its end (s).
     #[must_use]
     pub fn duration(&self) -> f64 {
@@ -235,14 +241,17 @@ impl Columns {
         }
         let number = |column: usize| {
             let field = fields.get(column).copied().unwrap_or_default();
-            let value = number_in(field).ok_or_else(|| format!("\"{}\" is not a number", shown(field)))?;
-            if value.abs() <= GREATEST_INPUT { Ok(value) } else { Err(format!("{value} is not a coordinate")) }
+            number_in(field).ok_or_else(|| format!("\"{}\" is not a number", shown(field)))
         };
         let mut q = JointVector::zeros(self.joints.len());
         for (x, &column) in q.iter_mut().zip(&self.joints) {
             *x = number(column)?;
+            if x.is_nan() || x.abs() > GREATEST_INPUT {
+                return Err(format!("{x} is not a coordinate"));
+            }
         }
-        Ok(Waypoint { time: number(self.time)?, q })
+        let time = number(self.time)?;
+        if time.is_finite() { Ok(Waypoint { time, q }) } else { Err(format!("{time} is not a time")) }
     }
 }
 
@@ -303,12 +312,13 @@ mod tests {
 
     #[test]
     fn hostile_files_are_refused_with_their_line() {
-        let cases: [(&[u8], &str); 16] = [
+        let cases: [(&[u8], &str); 17] = [
             (b"0,1,2\n1,2\n", ":2: 2 numbers"),
             (b"0,1,2,3\n", ":1: 4 numbers"),
             (b"0,1,2\n0,1,2\n", ":2: time 0 s does not come after"),
             (b"0,1,2\n1,nan,2\n", ":2: NaN is not a coordinate"),
             (b"0,1,2\n1,inf,2\n", ":2: inf is not a coordinate"),
+            (b"0,1,2\ninf,1,2\n", ":2: inf is not a time"),
             (b"0,1,2\n1,1e12,2\n", ":2: 1000000000000 is not a coordinate"),
             (b"time,shoulder,elbow\ntime,a,b\n", ":2: \"a\" is not a number"),
             (b"time,a,b\n0,1,2\n", ":1: no column of the header is called shoulder; it names time, a, b"),

@@ -70,8 +70,7 @@ fn check_joint(before: &[Joint], number: usize, joint: &Joint) -> Result<(), Ref
     let name = &joint.name;
     names::check(name).or_else(|why| refuse(true, format!("joint.{number}.name"), why))?;
     let twin = before.iter().any(|other| other.name == *name);
-    let message = format!("joint name `{name}` is empty or used twice");
-    refuse(twin || name.is_empty(), format!("joint.{number}.name"), message)?;
+    refuse(twin, format!("joint.{number}.name"), format!("joint name `{name}` is used twice"))?;
     let message = format!(
         "unit of joint `{name}` is that in the dataset, `rad` or `m`; that of a column stands beside it: position = {{ \
          column = .., unit = \"deg\" }}"

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     Error, JointVector,
     csv::{Lines, fields},
-    names::{counted, escaped},
+    names::{counted, escaped, listed},
 };
 use std::{io::BufRead, path::Path};
 
@@ -232,21 +232,6 @@ fn converted(quantity: &Quantity, raw: f64) -> f64 {
 /// SI units that one of `unit` is (1).
 fn in_si(unit: Option<ColumnUnit>) -> f64 {
     unit.map_or(1.0, |unit| unit.factor)
-}
-
-/// The first of `names`, as many as a message has room for.
-fn listed(names: &[&str]) -> String {
-    const MOST_NAMES: usize = 12;
-    const MOST_CHARACTERS: usize = 40;
-    let shown = |name: &&str| match name.char_indices().nth(MOST_CHARACTERS) {
-        Some((end, _)) => format!("{}…", &name[..end]),
-        None => (*name).to_owned(),
-    };
-    let mut list = names.iter().take(MOST_NAMES).map(shown).collect::<Vec<_>>().join(", ");
-    if names.len() > MOST_NAMES {
-        list.push_str(&format!(" and {} more", names.len() - MOST_NAMES));
-    }
-    list
 }
 
 /// A finite number written with `decimal`.

@@ -133,7 +133,7 @@ fn a_header_names_each_column_once_in_utf_8() {
     assert!(refused(b"t,\"x, y\",f\r0,1,2\r1,2,3\r").contains("carriage returns"));
     let many: Vec<String> = (0..3000).map(|column| format!("column {column}")).collect();
     let error = refused(many.join(",").as_bytes());
-    assert!(error.contains("column 11 and 2988 more") && error.len() < 400, "{error}");
+    assert!(error.contains("column 19 and 2980 more") && error.len() < 400, "{error}");
     // The same column may be left unnamed where it is not asked for.
     assert_eq!(read(b"t,\"x, y\",,,f\n0,1,9,9,2\n").unwrap(), [1.0]);
 }

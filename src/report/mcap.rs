@@ -28,6 +28,9 @@ use std::{
     sync::Arc,
 };
 
+/// What a session in MCAP says was written by.
+pub const LIBRARY: &str = "haptize";
+
 /// Time between two messages of where the links are (ns): 50 a second, between which viewers interpolate.
 const POSE_PERIOD: u64 = 20_000_000;
 
@@ -93,7 +96,7 @@ impl McapSession<'_> {
     ) -> io::Result<()> {
         let Self { chain, trace, .. } = *self;
         let names: Vec<String> = trace.joints.iter().map(|joint| joint.name.clone()).collect();
-        let mut writer = MessageWriter::new(out)?;
+        let mut writer = MessageWriter::new(out, LIBRARY)?;
         let mut topic = |name| writer.topic::<JointState>(name);
         let topics = [topic("/device")?, topic("/proxy")?, topic(HAND_TOPIC)?, topic("/command")?];
         let mut shown = Shown::begin(&mut writer, chain, object)?;

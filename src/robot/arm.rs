@@ -9,6 +9,7 @@ use super::group::Group;
 use super::{Inertial, Joint, JointType, Mimic, Placed, Robot};
 use crate::Error;
 use crate::MAX_JOINTS;
+use crate::names::listed;
 use crate::scene::JointKind;
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
@@ -140,7 +141,8 @@ fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error
         let refuse = |message: String| Err(Error::at(&robot.path, message));
         let Some(number) = robot.joints.iter().position(|joint| joint.name == *name) else {
             let joints = robot.joints.iter().filter(|joint| joint.kind != JointType::Fixed);
-            return refuse(format!("there is no joint {name:?} to lock: {}", listed(joints.map(|joint| &joint.name))));
+            let names: Vec<&str> = joints.map(|joint| joint.name.as_str()).collect();
+            return refuse(format!("there is no joint {name:?} to lock: {}", listed(&names)));
         };
         let joint = &robot.joints[number];
         let within = |[lower, upper]: [f64; 2]| *value >= lower && *value <= upper;
@@ -189,7 +191,7 @@ fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, Error> {
         } else if ends.is_empty() {
             "no chain ends, for its joints form a circle: a robot is a tree; remove one of them".into()
         } else {
-            format!("chains end at {}", listed(ends.iter().map(|(_, link)| &link.name)))
+            format!("chains end at {}", listed(&ends.iter().map(|(_, link)| &link.name).collect::<Vec<_>>()))
         };
         let message = format!("there is no link {tip:?}; {known}");
         return Err(Error::at(&robot.path, message));
@@ -214,18 +216,8 @@ fn way(robot: &Robot, tip: &str) -> Result<Vec<usize>, Error> {
 /// Least range of a joint (rad or m): ten times the digits with which a scene shows its grid.
 const LEAST_RANGE: f64 = 1e-4;
 
-/// Most names in a message.
-const MOST_LISTED: usize = 20;
-
 /// Most notes on a robot: more than anybody reads, and each counts the lines before its own.
 const MOST_NOTES: usize = 200;
-
-/// Returns the names, with commas; those of long lists are left out at the end.
-fn listed<'a>(names: impl Iterator<Item = &'a String>) -> String {
-    let names: Vec<&str> = names.map(String::as_str).collect();
-    let more = if names.len() > MOST_LISTED { ", .." } else { "" };
-    names[..names.len().min(MOST_LISTED)].join(", ") + more
-}
 
 /// Joints that each link carries.
 fn children(robot: &Robot) -> Vec<Vec<usize>> {

@@ -1,7 +1,7 @@
 //! The way that joints went, from an MCAP file.
 
 use super::{HAND_TOPIC, JointState, messages::Messages, table};
-use crate::{Error, JointVector};
+use crate::{Error, JointVector, names::listed};
 use std::path::Path;
 
 /// Most samples that are read: an hour at 1 kHz.
@@ -67,8 +67,8 @@ impl Course {
                 "no message of {} gives the positions of {}; its last one names {}: give another topic by --topic, or \
                  the joints these names",
                 course.topic,
-                joints.join(", "),
-                if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+                listed(joints),
+                if names.is_empty() { "none".to_owned() } else { listed(&names) }
             );
             return Err(Error::at(path, what));
         }

@@ -65,10 +65,6 @@ impl JointState {
             effort: decoder.f64s()?,
         };
         state.names.iter().try_for_each(|name| names::check(name))?;
-        if let Some(joint) = state.names.iter().position(|name| name.trim().is_empty()) {
-            let remedy = "give each joint a name where they are published";
-            return Err(format!("joint {} of it has no name: {remedy}", joint + 1));
-        }
         let mut known = HashSet::new();
         if let Some(twice) = state.names.iter().find(|name| !known.insert(name.as_str())) {
             let remedy = "give each joint a name of its own where they are published";

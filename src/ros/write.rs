@@ -28,12 +28,12 @@ fn failed(error: mcap::McapError) -> io::Error {
 }
 
 impl<W: Write> MessageWriter<W> {
-    /// Begins a file in `out`.
+    /// Begins a file in `out`, written by `library`.
     ///
     /// # Errors
     /// Those of `out`.
-    pub fn new(out: W) -> io::Result<Self> {
-        let options = WriteOptions::new().compression(None).profile("ros2").library("haptize").disable_seeking(true);
+    pub fn new(out: W, library: &str) -> io::Result<Self> {
+        let options = WriteOptions::new().compression(None).profile("ros2").library(library).disable_seeking(true);
         Ok(Self { writer: options.create(NoSeek::new(out)).map_err(failed)?, sequence: 0 })
     }
 

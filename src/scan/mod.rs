@@ -21,7 +21,7 @@ pub use log::{LogHeader, LogWriter, RowStatus, SIGNATURE, ScanLog, ScanRow};
 pub use pd_control::{PdControl, PdOutput};
 pub use plan::{Plan, PressRecord, Stop};
 pub use steady::Steadiness;
-pub use trajectory::{PLAN, Trajectory};
+pub use trajectory::{PLAN, PLAN_LIBRARY, Trajectory};
 
 use crate::{
     Error,

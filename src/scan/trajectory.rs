@@ -28,6 +28,9 @@ pub struct Trajectory {
 /// First line of a plan's table. Without it the plan would look like a motion that a person has recorded.
 pub const PLAN: &str = "# a plan of haptize";
 
+/// What a plan in MCAP says was written by.
+pub const PLAN_LIBRARY: &str = "haptize scan --plan-out";
+
 impl Trajectory {
     /// Returns the trajectory through `plan` at `speed` (rad/s or m/s), resting for `dwell` (s) at each point.
     #[must_use]
@@ -79,7 +82,7 @@ impl Trajectory {
     /// Those of `out`.
     pub fn write_mcap(&self, joints: &[JointLabel], out: impl Write) -> io::Result<()> {
         let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
-        let mut writer = MessageWriter::new(out)?;
+        let mut writer = MessageWriter::new(out, PLAN_LIBRARY)?;
         let topic = writer.topic::<JointState>("/plan")?;
         for (time, q) in &self.rows {
             let stamp = (time * 1e9).round() as u64;

@@ -3,7 +3,7 @@
 //! Which points are skipped is found out for the whole grid, as each shard does. The time of the others is shared out
 //! from the forecast of the whole sweep (`forecast.rs`).
 
-use super::{BackendChoice, Bake, Forecast, Shard};
+use super::{Backend, BackendChoice, Bake, Forecast, Shard};
 use crate::{Error, memory, scene::Scene};
 use serde::Serialize;
 use std::{sync::atomic::AtomicBool, time::Instant};
@@ -78,7 +78,7 @@ impl Plan {
             Ok(Self {
                 points,
                 solved: all,
-                threads: rayon::current_num_threads(),
+                threads: backend.threads(),
                 backend: backend.name(),
                 setup,
                 forecast,

@@ -148,10 +148,13 @@ impl Reach {
             let depth =
                 if touching.is_empty() { String::new() } else { format!(" by at most {:.1} mm", shallow * 1e3) };
             let configurations = met.len();
-            return Err(error!(
-                "the proxy touches the object at none of {configurations} random configurations within the joint \
-                 limits{depth}: move the object or the arm, widen the limits (limits of [[proxy.joint]]), or allow for \
-                 deeper contact (--depth)"
+            return Err(Error::at(
+                &scene.path,
+                format_args!(
+                    "the proxy touches the object at none of {configurations} random configurations within the joint \
+                     limits{depth}: move the object or the arm, widen the limits (limits of [[proxy.joint]]), or allow \
+                     for deeper contact (--depth)"
+                ),
             ));
         }
         let joints: Vec<JointReach> =

@@ -78,8 +78,9 @@ pub struct Viewer {
     pub(super) solver: Solver,
     /// What was done last, until it has faded.
     pub(super) notice: Option<Notice>,
-    /// Whether the scene was changed here and not saved.
+    /// Whether the scene was changed here and not saved, and what its file held when it was read.
     pub(super) is_unsaved: bool,
+    pub(super) scene_text: String,
     /// The film that is being taken.
     pub(super) film: Option<Film>,
     /// One that is being written.
@@ -141,6 +142,7 @@ impl Viewer {
             solver: Solver::Auto,
             notice: None,
             is_unsaved: false,
+            scene_text: String::new(),
             title: String::new(),
             film: None,
             written: None,
@@ -246,6 +248,10 @@ impl Viewer {
                             self.is_unsaved = true;
                             self.scene.change(&session.loaded, body);
                         } else {
+                            // A bake of what was changed here leaves the file as it is.
+                            if let (false, Some(scene)) = (self.is_unsaved, &session.loaded.scene) {
+                                self.scene_text.clone_from(&scene.text);
+                            }
                             self.scene.open(&session.loaded, body);
                         }
                         if let Some(before) = ended.as_ref().or(self.session.as_ref().map(|before| &before.controls)) {

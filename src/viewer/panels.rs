@@ -20,7 +20,7 @@ use super::{
     },
 };
 use crate::{
-    dataset::replace_file,
+    dataset::rewrite_file,
     gpu::ADAPTER_VARIABLE,
     render::{flags::Flags, setup::border_stiffness, trace::Tick},
 };
@@ -28,7 +28,7 @@ use eframe::egui::{
     self, Align, Button, CentralPanel, CollapsingHeader, Color32, Frame, Grid, Key, Label, Layout, Modifiers, Panel,
     ProgressBar, RichText, ScrollArea, Slider, TextStyle, Ui, vec2,
 };
-use std::{io::Write, path::Path};
+use std::path::Path;
 
 impl Viewer {
     /// The whole window.
@@ -357,9 +357,11 @@ impl Viewer {
         let Some(session) = &self.session else { return };
         let saved = match (&session.loaded.scene, &session.loaded.report) {
             (Some(scene), _) if self.is_unsaved => {
-                let written = replace_file(&scene.path, |file| file.write_all(scene.text.as_bytes()));
-                written.map(|()| scene.path.clone()).map_err(|error| {
-                    format!("cannot write {}: {error}; free some space or choose another folder", scene.path.display())
+                let written = rewrite_file(&scene.path, &self.scene_text, &scene.text);
+                let written = written.map_err(|error| format!("cannot write {}: {error}", scene.path.display()));
+                written.map(|()| {
+                    self.scene_text.clone_from(&scene.text);
+                    scene.path.clone()
                 })
             }
             (_, Some(_)) => {

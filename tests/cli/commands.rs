@@ -298,6 +298,8 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
     std::fs::write(path("wide.csv"), "0,0\n0.1,0,0\n").unwrap();
     std::fs::write(path("nan.csv"), "# by hand\ntime,q1\n0,0\n0.1,nan\n").unwrap();
     std::fs::write(path("point.csv"), "0,0\n").unwrap();
+    std::fs::write(path("before.csv"), "-2,0\n-1,0.1\n").unwrap();
+    std::fs::write(path("stamped.csv"), "1700000000,0\n1700000001,0.1\n").unwrap();
     let recorded = std::fs::read_to_string(path("r.csv")).unwrap();
     // The proxy's position; the last column is what the device held.
     let (rest, held) = recorded.trim_end().rsplit_once(',').unwrap();
@@ -309,6 +311,9 @@ fn a_session_is_recorded_and_replayed_bit_for_bit_and_wrong_input_is_named() {
         (&["finger.haptize", "--motion", "wide.csv"], "wide.csv:2: 3 numbers"),
         (&["finger.haptize", "--motion", "nan.csv"], "nan.csv:4: NaN is not a coordinate"),
         (&["finger.haptize", "--motion", "point.csv"], "a single position: give --seconds"),
+        (&["finger.haptize", "--motion", "before.csv"], "before.csv: the motion goes from -2 s to -1 s"),
+        (&["finger.haptize", "--motion", "before.csv", "--seconds", "0.1"], "let its times begin at 0"),
+        (&["finger.haptize", "--motion", "stamped.csv", "--seconds", "0.1"], "from 1700000000 s to 1700000001 s"),
         (&["finger.haptize", "--motion", "scrape"], "no motion \"scrape\""),
         (&["finger.haptize", "--seconds", "nan"], "--seconds"),
         (&["finger.haptize", "--replay", "none.csv"], "none.csv: cannot be read"),

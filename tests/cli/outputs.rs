@@ -20,9 +20,15 @@ fn no_output_destroys_an_input() {
     std::fs::write(path("move.csv"), "0,0\n0.1,0\n").unwrap();
     std::fs::write(path("walk.csv"), "time [s],finger [rad]\n0,0\n0.1,0\n").unwrap();
     std::fs::write(path("touch.py"), "import haptize\nprint(haptize.__version__)\n").unwrap();
+    let weights = r#"{"w":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}}    "#;
+    std::fs::write(path("weights.safetensors"), [&58_u64.to_le_bytes()[..], weights.as_bytes(), &[0; 4]].concat())
+        .unwrap();
+    std::fs::write(path("mine.npz"), b"PK\x03\x04 torque.npy").unwrap();
+    std::fs::write(path("scanned.csv"), "# haptize scan log, version 1\n").unwrap();
     std::fs::create_dir(path("o")).unwrap();
     std::fs::copy(path("move.csv"), path("o/trace.csv")).unwrap();
     std::fs::hard_link(path("finger.haptize"), path("hard.haptize")).unwrap();
+    let long = "x".repeat(300);
     let all = [
         "finger.toml",
         "finger.haptize",
@@ -30,6 +36,9 @@ fn no_output_destroys_an_input() {
         "move.csv",
         "walk.csv",
         "touch.py",
+        "weights.safetensors",
+        "mine.npz",
+        "scanned.csv",
         "o/trace.csv",
         "hard.haptize",
     ];
@@ -49,7 +58,11 @@ fn no_output_destroys_an_input() {
             "give --format csv, or a file whose name ends in .npz",
         ),
         (&["export", "finger.haptize", "--format", "csv", "-o", "walk.csv"], "not a table or figure"),
-        (&["play", "finger.haptize", "--record", "touch.py"], "not a log"),
+        (&["bake", "finger.toml", "-o", "weights.safetensors"], "not a dataset"),
+        (&["export", "finger.haptize", "--format", "npz", "-o", "mine.npz"], "not a table or figure"),
+        (&["play", "finger.haptize", "--record", "touch.py"], "not the record of a session"),
+        (&["play", "finger.haptize", "--record", "scanned.csv"], "not the record of a session"),
+        (&["play", "finger.haptize", "--record", long.as_str()], "choose a shorter name"),
         (&["play", "finger.haptize", "--record", "finger.haptize"], "also an input"),
         (&["play", "finger.haptize", "--motion", "o/trace.csv", "-o", "o"], "also an input"),
         (&["gridize", "move.csv", "--step", "0.1", "-o", "move.csv"], "also an input"),

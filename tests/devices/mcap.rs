@@ -23,7 +23,7 @@ use std::{
 /// A file of `states`, each with its topic.
 fn file(folder: &Path, name: &str, states: &[(&str, JointState)]) -> PathBuf {
     let path = folder.join(name);
-    let mut writer = MessageWriter::new(fs::File::create(&path).unwrap()).unwrap();
+    let mut writer = MessageWriter::new(fs::File::create(&path).unwrap(), "haptize").unwrap();
     let mut known: BTreeMap<&str, u16> = BTreeMap::new();
     for (topic, state) in states {
         let number = *known.entry(topic).or_insert_with(|| writer.topic::<JointState>(topic).unwrap());
@@ -153,7 +153,7 @@ fn joint_states_of_which_no_torque_can_be_made_are_refused_with_the_cause() {
     let error = refused(states(&[0.5], |k| ["arm", "gripper"][k as usize % 2]), &["arm", "gripper"]);
     assert!(error.contains("50 of 50 rows cannot be used") && error.contains("(--columns) with `bad_rows = \"drop\"`"), "{error}");
     let nameless = refused(states(&[0.5], |k| ["x", " "][usize::from(k > 2)]), &["x"]);
-    assert!(nameless.contains("message 4 of /joint_states is no") && nameless.contains("joint 1 of it has no name"));
+    assert!(nameless.contains("message 4 of /joint_states is no") && nameless.contains("a name is blank"));
     let states_of_none = refused(vec![("/joint_states", state(0, &[], &[], &[]))], &["x"]);
     assert!(states_of_none.contains("no message of /joint_states names a joint"), "{states_of_none}");
     let mut many = state(0, &["x"; 1025], &[], &[]);

@@ -162,7 +162,11 @@ fn a_folder_holds_the_files_of_one_run_and_it_is_told_what_was_replaced() {
     let mut left = files(&offline);
     left.insert("notes.txt".into());
     assert_eq!(names(&home.path().join("o")), left);
-    refused(home.path(), &["play", "x.haptize", "--record", "o/../o/trace.csv", "-o", "o"], "is not a log of haptize");
+    refused(
+        home.path(),
+        &["play", "x.haptize", "--record", "o/../o/trace.csv", "-o", "o"],
+        "is not the record of a session",
+    );
     refused(home.path(), &["play", "x.haptize", "--record", "new/motion.svg", "-o", "new"], "cannot be written");
     for again in [
         &["man", "-o", "m"][..],

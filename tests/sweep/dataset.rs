@@ -5,6 +5,7 @@ use haptize::{
     Error, ErrorKind,
     contact::Status,
     dataset::{Axis, Contacts, Dataset, Format, Grid, Provenance, SlipColumns, Solid, Surface},
+    report::page::Page,
 };
 use std::{
     fs::{File, OpenOptions},
@@ -440,6 +441,11 @@ fn a_dataset_that_contradicts_itself_is_not_written() {
     ];
     for dataset in wrong {
         assert!(dataset.save(&path).unwrap_err().to_string().contains("contradicts itself"));
+        for format in [Format::Npz, Format::Csv, Format::Hdf5, Format::Vti] {
+            let file = folder.file("a").with_extension(format.extension());
+            assert!(dataset.export(&file, format).unwrap_err().to_string().contains("contradicts itself"));
+            assert!(!file.exists());
+        }
     }
     assert_eq!(std::fs::read(&path).unwrap(), before);
     assert_eq!(sample().save(&folder.file("no/such/folder/a")).unwrap_err().kind(), ErrorKind::File);
@@ -454,6 +460,20 @@ fn a_mapped_dataset_survives_its_replacement() {
     bare().save(&path).unwrap();
     assert_eq!(contents(&mapped), contents(&sample()));
     assert_eq!(contents(&Dataset::open(&path).unwrap()), contents(&bare()));
+}
+
+/// As where another program overwrites a file that is mapped.
+#[test]
+fn contacts_whose_offsets_lead_nowhere_are_none() {
+    for offsets in [[u64::MAX; 7], [0, 5, 2, 9, 3, 0, 5], [0, 0, 2, 3, 5, 5, u64::MAX / 3 + 2]] {
+        let mut dataset = sample();
+        let contacts = dataset.contacts.as_mut().unwrap();
+        contacts.offsets = offsets.to_vec().into();
+        contacts.forces = vec![1.0; 12].into();
+        assert!((0..6).all(|point| dataset.forces(point).len() <= 5));
+        assert!(dataset.summary().max_contacts <= Some(5));
+        assert!(Page::dataset("sample".into(), &dataset).html().is_ok());
+    }
 }
 
 #[test]

@@ -86,6 +86,22 @@ fn a_typed_place_moves_the_object_and_the_distance_to_it_is_live() {
 }
 
 #[test]
+fn what_an_editor_wrote_into_the_scene_meanwhile_is_kept() {
+    let (folder, file, mut window) = own();
+    window.click("Bring it to the tip");
+    window.wait();
+    let edited = std::fs::read_to_string(&file).unwrap() + "# mine\n";
+    std::fs::write(&file, &edited).unwrap();
+    window.click("Save scene");
+    let refused = window.harness.state().error().unwrap().to_owned();
+    assert!(refused.contains("mine.toml") && refused.contains("another program has changed it"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), edited);
+    std::fs::rename(&file, folder.path().join("theirs.toml")).unwrap();
+    window.click("Dismiss");
+    saved(&mut window, &file);
+}
+
+#[test]
 fn a_pose_makes_a_grid_and_motions_that_touch() {
     let (_folder, file, mut window) = own();
     for way in ["Bring it to the tip", "Use this pose"] {

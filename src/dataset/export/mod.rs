@@ -5,7 +5,12 @@ mod hdf5;
 mod npz;
 mod vti;
 
-use super::{Axis, Dataset, error::unwritable, replace_file};
+use super::{
+    Axis, Dataset,
+    check::check,
+    error::{inconsistent, unwritable},
+    replace_file,
+};
 use crate::Error;
 use std::{
     fs::File,
@@ -70,8 +75,9 @@ impl Dataset {
     /// Exports the dataset to `path`, replacing it whole or not at all; returns the files written.
     ///
     /// # Errors
-    /// When the system refuses, or the format has no room for so many joints.
+    /// When the dataset would be refused on reading, the system refuses, or the format has no room for so many joints.
     pub fn export(&self, path: &Path, format: Format) -> Result<Vec<PathBuf>, Error> {
+        check(self).map_err(|reason| inconsistent(path, reason))?;
         match format {
             Format::Npz => replaced(path, |out| npz::write(self, out)),
             Format::Hdf5 => hdf5::export(self, path),

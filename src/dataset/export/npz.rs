@@ -71,6 +71,8 @@ impl<W: Seek> Seek for Quiet<W> {
 
 pub(super) fn write(dataset: &Dataset, out: impl Write + Seek) -> io::Result<()> {
     let (mut zip, grid) = (ZipWriter::new(Quiet::new(out)), &dataset.grid);
+    // First: by it the archive is known for one of haptize.
+    texts(&mut zip, "provenance", &[], vec![serde_json::to_string(&dataset.provenance)?])?;
     for (_, tensor) in file::arrays(dataset) {
         let (name, shape) = (tensor.name, &tensor.shape);
         match tensor.dtype {
@@ -96,7 +98,6 @@ pub(super) fn write(dataset: &Dataset, out: impl Write + Seek) -> io::Result<()>
     texts(&mut zip, "units", &[units.len(), 2], units.into_iter().flatten().collect())?;
     texts(&mut zip, "axes", &[axes.len(), 2], axes.into_iter().flatten().collect())?;
     texts(&mut zip, "scene", &[], vec![dataset.scene.clone()])?;
-    texts(&mut zip, "provenance", &[], vec![serde_json::to_string(&dataset.provenance)?])?;
     zip.finish()?;
     Ok(())
 }
