@@ -68,13 +68,8 @@ fn subtract(supernodes: &Supernodes, pattern: &[usize], below: MatRef<'_, f64>, 
     let left = below.subrows(columns.start, rows);
     let mut product = Mat::zeros(rows, columns.len());
     matmul(product.as_mut(), Accum::Replace, left, left.subrows(0, columns.len()).transpose(), 1.0, Par::Seq);
-    let (own, height) = (supernodes.columns(s), supernodes.columns(s).len() + supernodes.pattern(s).len());
-    let mut others = supernodes.pattern(s).iter().zip(own.len()..);
-    let place = |&row: &usize| {
-        let mut other = || others.find(|(other, _)| **other == row).map_or(height, |(_, place)| place);
-        if row < own.end { row - own.start } else { other() }
-    };
-    let places: Vec<usize> = pattern[columns.start..].iter().map(place).collect();
+    let places: Vec<usize> = pattern[columns.start..].iter().map(|&row| supernodes.place(s, row)).collect();
+    let height = supernodes.columns(s).len() + supernodes.pattern(s).len();
     for (k, product) in product.col_iter().enumerate() {
         let column = &mut values[height * places[k]..][..height];
         places.iter().zip(product.iter()).skip(k).for_each(|(&place, product)| column[place] -= product);
