@@ -6,8 +6,8 @@
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use std::ops::Range;
 
-/// Nodes of a supernode at most. More: more numbers above diagonals. Fewer: narrower blocks for dense products.
-const MOST_NODES: usize = 32;
+/// Columns of a supernode at most. More: more numbers above diagonals. Fewer: narrower blocks for dense products.
+const MOST_COLUMNS: usize = 96;
 
 /// For each supernode its columns, the rows below these, and where its values are.
 #[derive(Clone, Debug)]
@@ -35,8 +35,8 @@ impl Supernodes {
         let mut all = Self { begins: vec![0], patterns: vec![0], rows: Vec::new(), values: vec![0] };
         let rows = |&node: &usize| rows_per_node * node..rows_per_node * (node + 1);
         for (s, (&begin, &end)) in symbolic.supernode_begin().iter().zip(symbolic.supernode_end()).enumerate() {
-            for first in (begin..end).step_by(MOST_NODES) {
-                let next = end.min(first + MOST_NODES);
+            for first in (begin..end).step_by(MOST_COLUMNS / rows_per_node) {
+                let next = end.min(first + MOST_COLUMNS / rows_per_node);
                 all.rows.extend(rows_per_node * next..rows_per_node * end);
                 all.rows.extend(symbolic.supernode(s).pattern().iter().flat_map(rows));
                 let below = all.rows.len() - all.patterns[all.patterns.len() - 1];
