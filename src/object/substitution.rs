@@ -2,8 +2,7 @@
 //!
 //! Supernodes of a surface are a few columns wide, and a frame has one right-hand side: routines for dense blocks then
 //! spend most of their time on being called. Plain loops over the columns read L once in each direction and do little
-//! else. A right-hand side is of numbers, or of vectors where one matrix stands for all three
-//! coordinates.
+//! else. A right-hand side is of numbers, or of vectors where one matrix stands for all three coordinates.
 //!
 //! Reading L from memory takes most of the time. So subtrees of the elimination tree, which do not touch each other's
 //! rows, are solved side by side, before the rest forward and after it backward; what they leave in the rest's rows is
