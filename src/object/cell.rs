@@ -8,17 +8,16 @@ use super::{corners, inclusion::Materials, lattice::Lattice, level::Level, solid
 use crate::{memory, scene::ElasticSpec};
 use glam::DVec3;
 
-/// Factor of a solid over n^(4/3) (B): 650 to 900 up to 16,000 nodes. At 31,000 it is 1,130, for which the other half
-/// of the memory has room.
+/// Factor of a solid over n^(4/3) (B): 490 to 860 between 5,000 and 70,000 nodes. For more the other half of the memory
+/// has room.
 const FACTOR: f64 = 800.0;
 
-/// By how much more it is where a skin with a bending stiffness couples cubes around each node of the surface (1): 4.6
+/// By how much more it is where a skin with a bending stiffness couples cubes around each node of the surface (1): 4.4
 /// times in the slab of `docs/solids.md`.
 const BENT: f64 = 5.0;
 
-/// K, and its lower half with the numbers of its rows, for each node (B): a node of cubes shares some with 64 nodes on
-/// average, and their blocks have nine numbers.
-const MATRIX: f64 = 2.0 * 64.0 * 9.0 * size_of::<f64>() as f64;
+/// K, for each node (B): a node of cubes shares some with 64 nodes on average, and their blocks have nine numbers.
+const MATRIX: f64 = 64.0 * 9.0 * size_of::<f64>() as f64;
 
 /// Most that the set-up of a lattice may take, where so much is left (B): such a factor takes some minutes on a laptop.
 const MOST: usize = 3 << 30;
@@ -111,7 +110,7 @@ mod tests {
         assert!(ball(Some(suitable), 1e7).mechanics().unwrap().moved.len() == free.mechanics().unwrap().moved.len());
         for (object, limit) in [(&free, taken(suitable)), (&small, 1e7)] {
             let Mechanics { factor, stiffness, .. } = object.mechanics().unwrap();
-            let bytes = factor.bytes() + 2 * size_of_val(&stiffness.blocks[..]);
+            let bytes = factor.bytes() + size_of_val(&stiffness.blocks[..]);
             assert!((0.3 * limit..limit).contains(&(bytes as f64)), "{bytes} of {limit}");
         }
         // Who bakes is told of it, whatever the error.

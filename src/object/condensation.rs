@@ -6,7 +6,7 @@
 //! the order of elimination share most of their paths. So they are solved in blocks, dense over the supernodes that
 //! lie on any path of the block, and two blocks are multiplied over the supernodes that both have.
 
-use super::{outlook, substitution::Supernodes};
+use super::{outlook, supernodes::Supernodes};
 use faer::linalg::{matmul::matmul, triangular_solve::solve_lower_triangular_in_place};
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;

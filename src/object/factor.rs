@@ -12,19 +12,19 @@
 use super::{
     Stiffness,
     condensation::condense,
+    elimination::factorize,
     outlook,
-    substitution::{Partition, Supernodes, substitute},
+    substitution::{Partition, substitute},
+    supernodes::Supernodes,
 };
 use crate::{Error, ErrorKind, error, memory};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::solvers::LltError;
+use faer::Side;
 use faer::perm::PermRef;
+use faer::sparse::SymbolicSparseColMat;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Par, Side};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -59,56 +59,45 @@ impl Factor {
         let resources =
             |reason: &dyn std::fmt::Display| error!("the matrix of the object cannot be factorised: {reason}");
         let rows_per_node = if stiffness.is_isotropic() { 1 } else { 3 };
-        let matrix = lower_half(stiffness, alpha, diagonal, rows_per_node);
-        let rows = |&node: &u32| (0..rows_per_node).map(move |a| rows_per_node * node as usize + a);
-        let order: Vec<usize> = stiffness.ordering.iter().flat_map(rows).collect();
-        let mut rank = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(k, &row)| rank[row] = k);
-        let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&order, &rank, order.len()));
+        let forward: Vec<usize> = stiffness.ordering.iter().map(|node| *node as usize).collect();
+        let mut ranks = vec![0; forward.len()];
+        forward.iter().enumerate().for_each(|(rank, &node)| ranks[node] = rank);
+        let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&forward, &ranks, forward.len()));
         let params = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, ordering, params)
+        let symbolic = factorize_symbolic_cholesky(lower_half(stiffness).as_ref(), Side::Lower, ordering, params)
             .map_err(|error| resources(&error))?;
         let (SymbolicCholeskyRaw::Supernodal(supernodal), Some(order)) = (symbolic.raw(), symbolic.perm()) else {
             return Err(resources(&"no supernodes"));
         };
-        let supernodes = Supernodes::new(supernodal);
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let bytes = symbolic.len_val() * size_of::<f64>() + scratch.size_bytes();
+        let supernodes = Supernodes::new(supernodal, rows_per_node);
+        let bytes = supernodes.entries() * size_of::<f64>();
         if bytes > memory::SMALL {
             memory::check(bytes).map_err(|shortage| resources(&shortage))?;
         }
         let mut values = Vec::new();
-        values.try_reserve_exact(symbolic.len_val()).map_err(|error| resources(&error))?;
-        values.resize(symbolic.len_val(), 0.0);
+        values.try_reserve_exact(supernodes.entries()).map_err(|error| resources(&error))?;
+        values.resize(supernodes.entries(), 0.0);
+        let (forward, backward) = order.arrays();
+        scatter(stiffness, alpha, diagonal, (backward, rows_per_node), &supernodes, &mut values);
         let operations = (0..supernodes.count())
             .map(|s| outlook::factorisation(supernodes.columns(s).len(), supernodes.pattern(s).len()));
-        let rows = order.len();
-        outlook::announce(format_args!("factorising the object's matrix of {rows} rows"), operations.sum(), 1);
-        let mut scratch = MemBuffer::try_new(scratch).map_err(|_| resources(&"out of memory"))?;
-        let outcome = symbolic.factorize_numeric_llt(
-            &mut values,
-            matrix.as_ref(),
-            Side::Lower,
-            Default::default(),
-            Par::Seq,
-            MemStack::new(&mut scratch),
-            Default::default(),
-        );
-        match outcome {
-            Ok(_) => Ok(Self {
-                rows_per_node,
-                order: order.arrays().0.into(),
-                partition: Arc::new(Partition::new(&supernodes)),
-                supernodes: Arc::new(supernodes),
-                values: Arc::new(values),
-            }),
-            Err(LltError::NonPositivePivot { .. }) => {
-                Err(error!("the matrix of the object is not positive definite").of(ErrorKind::Indefinite))
-            }
+        let rows = rows_per_node * forward.len();
+        let what = format_args!("factorising the object's matrix of {rows} rows");
+        outlook::announce(what, operations.sum(), rayon::current_num_threads());
+        if !factorize(&supernodes, &mut values) {
+            return Err(error!("the matrix of the object is not positive definite").of(ErrorKind::Indefinite));
         }
+        let rows = |&node: &usize| rows_per_node * node..rows_per_node * (node + 1);
+        Ok(Self {
+            rows_per_node,
+            order: forward.iter().flat_map(rows).collect(),
+            partition: Arc::new(Partition::new(&supernodes)),
+            supernodes: Arc::new(supernodes),
+            values: Arc::new(values),
+        })
     }
 
     /// Solves for one vector per node in place: forces (N) become displacements (m) if the matrix is K.
@@ -153,27 +142,41 @@ impl Factor {
     }
 }
 
-/// Compressed columns of the lower half, with the first `rows_per_node` coordinates of each node. K is symmetric, so
-/// column c is row c from the diagonal on.
-fn lower_half(stiffness: &Stiffness, alpha: f64, diagonal: &[f64], rows_per_node: usize) -> SparseColMat<usize, f64> {
-    let order = rows_per_node * stiffness.nodes();
-    let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
-    for (node, added) in diagonal.iter().enumerate().take(stiffness.nodes()) {
-        for b in 0..rows_per_node {
-            for (other, block) in stiffness.row(node).filter(|(other, _)| *other >= node) {
-                for a in 0..rows_per_node {
-                    let (row, column) = (rows_per_node * other + a, rows_per_node * node + b);
-                    if row >= column {
-                        rows.push(row);
-                        let extra = if row == column { *added } else { 0.0 };
-                        values.push(alpha * block.row(b)[a] + extra);
-                    }
+/// Compressed columns of the pattern's lower half, a row a node. K is symmetric, so column c is row c from the diagonal
+/// on.
+fn lower_half(stiffness: &Stiffness) -> SymbolicSparseColMat<usize> {
+    let (mut starts, mut rows) = (vec![0], Vec::new());
+    for node in 0..stiffness.nodes() {
+        rows.extend(stiffness.row(node).map(|(other, _)| other).filter(|other| *other >= node));
+        starts.push(rows.len());
+    }
+    SymbolicSparseColMat::new_checked(stiffness.nodes(), stiffness.nodes(), starts, None, rows)
+}
+
+/// Sets `values` to the lower half of `alpha` K + diag(`diagonal`), node after node in the order of `ranks`.
+fn scatter(
+    stiffness: &Stiffness,
+    alpha: f64,
+    diagonal: &[f64],
+    (ranks, rows_per_node): (&[usize], usize),
+    supernodes: &Supernodes,
+    values: &mut [f64],
+) {
+    for (node, added) in diagonal.iter().enumerate() {
+        let first = rows_per_node * ranks[node];
+        let s = supernodes.with(first);
+        let height = supernodes.columns(s).len() + supernodes.pattern(s).len();
+        let own = &mut values[supernodes.range(s)][height * (first - supernodes.columns(s).start)..];
+        for (other, block) in stiffness.row(node).filter(|(other, _)| ranks[*other] >= ranks[node]) {
+            let place = supernodes.place(s, rows_per_node * ranks[other]);
+            for (b, column) in own.chunks_exact_mut(height).take(rows_per_node).enumerate() {
+                for (a, value) in column[place..][..rows_per_node].iter_mut().enumerate() {
+                    let extra = if other == node && a == b { *added } else { 0.0 };
+                    *value = alpha * block.row(b)[a] + extra;
                 }
             }
-            starts.push(rows.len());
         }
     }
-    SparseColMat::new(SymbolicSparseColMat::new_checked(order, order, starts, None, rows), values)
 }
 
 /// The factor of K, or the reason why K is not positive definite to working precision.
@@ -310,7 +313,7 @@ mod tests {
             for threads in [1, 3] {
                 let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let mut again = forces.clone();
-                threads.install(|| factor.solve(&mut again));
+                threads.install(|| Factor::of(stiffness, 1.0, &vec![3.0; nodes]).unwrap().solve(&mut again));
                 assert!(again == one, "threads leave a trace");
             }
             let mut resisted = vec![DVec3::ZERO; nodes];

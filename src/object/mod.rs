@@ -13,6 +13,7 @@ mod condensation;
 mod crossing;
 mod draft;
 mod element;
+mod elimination;
 mod factor;
 mod ground;
 mod icosphere;
@@ -35,6 +36,7 @@ mod springs;
 mod stiffening;
 mod stiffness;
 mod substitution;
+mod supernodes;
 mod tetrahedra;
 mod topology;
 

@@ -6,9 +6,10 @@
 //! factor on a surface, O(N^(4/3)) in a solid. Meshes of points in space dissect better by geometry than by minimum
 //! degree on the graph, and faster.
 //!
-//! Of all planes across the three axes that one is taken for which s^2 / (a b) is least, s being the size of the
-//! separator and a and b those of the parts: a separator costs its square, and saves the entries between the parts. In
-//! a lattice it lies between cubes, and beside a region of small cubes rather than through it.
+//! Of all planes across the three axes that one is taken for which s^(3/2) / (a b) is least, s being the size of the
+//! separator and a and b those of the parts. In a solid s^(3/2) grows as the smaller part does, so that no place is
+//! preferred for its size alone. A separator lies between the cubes of a lattice, and beside a region of small ones rather
+//! than through it.
 
 use super::Stiffness;
 use glam::DVec3;
@@ -90,7 +91,7 @@ fn cuts(stiffness: &Stiffness, positions: &[DVec3], nodes: &[u32], axis: usize, 
             let side = if is_below { below } else { nodes.len() as isize - below };
             let [separator, one, other] =
                 [separators[k], side - separators[k], nodes.len() as isize - side].map(|count| count as f64);
-            cuts.push(Cut { axis, above, is_below, cost: separator * separator / (one * other) });
+            cuts.push(Cut { axis, above, is_below, cost: separator.powf(1.5) / (one * other) });
         }
     }
     cuts

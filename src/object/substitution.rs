@@ -1,10 +1,8 @@
 //! Forward and backward substitution with a supernodal Cholesky factor, for one right-hand side at a time.
 //!
-//! L is stored by supernodes: columns that share their rows, as one dense trapezoid each (Ng & Peyton, Block sparse
-//! Cholesky algorithms, 1993). Those of a surface are a few columns wide, and a frame has one right-hand side: routines
-//! for dense blocks then spend most of their time on being called. Plain loops over the columns read L once in each
-//! direction and do little else. A right-hand side is of numbers, or of vectors where one matrix stands for all three
-//! coordinates.
+//! Supernodes of a surface are a few columns wide, and a frame has one right-hand side: routines for dense blocks then
+//! spend most of their time on being called. Plain loops over the columns read L once in each direction and do little
+//! else. A right-hand side is of numbers, or of vectors where one matrix stands for all three coordinates.
 //!
 //! Reading L from memory takes most of the time. So subtrees of the elimination tree, which do not touch each other's
 //! rows, are solved side by side, before the rest forward and after it backward; what they leave in the rest's rows is
@@ -14,7 +12,7 @@
 //! Sharing out is what it is for. On one thread it takes as long as faer's own solve, 24.5 ms and 24.8 with the factor
 //! of 100,000 nodes; on two it takes 14.4 ms, where a frame may last 16.7 (`cargo bench --bench frame`).
 
-use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
+use super::supernodes::{Supernode, Supernodes};
 use rayon::prelude::*;
 use std::ops::{AddAssign, Mul, Range, SubAssign};
 
@@ -53,82 +51,16 @@ struct Subtree {
     starts: Vec<usize>,
 }
 
-/// Where L has its entries: for each supernode its columns, the rows below these, and where its values are.
-#[derive(Clone, Debug)]
-pub(super) struct Supernodes {
-    /// First column of each, then the number of columns.
-    begins: Vec<usize>,
-    /// Start of each supernode's rows in `rows`, and their end.
-    patterns: Vec<usize>,
-    rows: Vec<usize>,
-    /// Start of each supernode's values, and their end.
-    values: Vec<usize>,
-}
-
-/// A dense trapezoid of L, column after column.
-pub(super) struct Supernode<'f> {
-    pub columns: Range<usize>,
-    /// Rows below, ascending.
-    pub pattern: &'f [usize],
-    pub values: &'f [f64],
-}
-
-impl Supernodes {
-    pub fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Self {
-        let (mut patterns, mut rows) = (vec![0], Vec::new());
-        for s in 0..symbolic.n_supernodes() {
-            rows.extend_from_slice(symbolic.supernode(s).pattern());
-            patterns.push(rows.len());
-        }
-        let begins = symbolic.supernode_begin().iter().copied().chain(symbolic.supernode_end().last().copied());
-        Self { begins: begins.collect(), patterns, rows, values: symbolic.col_ptr_for_val().to_vec() }
-    }
-
-    /// Number of supernodes.
-    pub fn count(&self) -> usize {
-        self.patterns.len() - 1
-    }
-
-    pub fn columns(&self, s: usize) -> Range<usize> {
-        self.begins[s]..self.begins[s + 1]
-    }
-
-    /// Rows below the supernode's own, ascending.
-    pub fn pattern(&self, s: usize) -> &[usize] {
-        &self.rows[self.patterns[s]..self.patterns[s + 1]]
-    }
-
-    /// The supernode with column `column`.
-    pub fn with(&self, column: usize) -> usize {
-        self.begins.partition_point(|begin| *begin <= column) - 1
-    }
-
-    /// Its parent in the elimination tree, the first that its rows touch; none for a root.
-    pub fn parent(&self, s: usize) -> Option<usize> {
-        self.pattern(s).first().map(|&row| self.with(row))
-    }
-
-    /// The supernode with its part of all `values`.
-    pub fn get<'f>(&'f self, values: &'f [f64], s: usize) -> Supernode<'f> {
-        Supernode {
-            columns: self.columns(s),
-            pattern: self.pattern(s),
-            values: &values[self.values[s]..self.values[s + 1]],
-        }
-    }
-}
-
 impl Partition {
     /// Subtrees of a factor large enough to be worth it; else all is the rest.
     pub fn new(supernodes: &Supernodes) -> Self {
         let count = supernodes.count();
-        let entries = supernodes.values[count];
+        let entries = supernodes.entries();
         if entries < LEAST_FACTOR_TO_SHARE {
             return Self { subtrees: Vec::new(), rest: (0..count).collect() };
         }
         // Of the subtree below each supernode: its entries, its first supernode, and how many there are.
-        let sizes = supernodes.values.windows(2).map(|ends| ends[1] - ends[0]);
-        let mut below: Vec<(usize, usize, usize)> = sizes.enumerate().map(|(s, size)| (size, s, 1)).collect();
+        let mut below: Vec<(usize, usize, usize)> = (0..count).map(|s| (supernodes.range(s).len(), s, 1)).collect();
         for s in 0..count {
             let (size, first, members) = below[s];
             if let Some(parent) = supernodes.parent(s) {
@@ -162,7 +94,7 @@ impl Partition {
 
 impl Subtree {
     fn new(all: &Supernodes, supernodes: Range<usize>) -> Self {
-        let rows = all.begins[supernodes.start]..all.begins[supernodes.end];
+        let rows = all.columns(supernodes.start).start..all.columns(supernodes.end - 1).end;
         let beyond = |s: usize| all.pattern(s).iter().copied().filter(|&row| row >= rows.end);
         let mut border: Vec<usize> = supernodes.clone().flat_map(beyond).collect();
         border.sort_unstable();

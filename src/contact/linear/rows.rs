@@ -29,31 +29,28 @@ impl<'a, B: Iterator<Item = (&'a [f64], [f64; 3])>> Kernel for AddRows<'_, B> {
     }
 }
 
-/// Sets `sums` to the sum of `loads`: of rows of the square matrix `entries`, as long as it, times a number each.
-pub fn combine(entries: &[f64], loads: impl Iterator<Item = (usize, f64)>, sums: &mut [f64]) {
-    widest(Combine { entries, loads, sums });
+/// Sets `sums` to the sum of `rows`, as long as it, times a number each.
+pub fn combine<'a>(rows: impl Iterator<Item = (&'a [f64], f64)>, sums: &mut [f64]) {
+    widest(Combine { rows, sums });
 }
 
-struct Combine<'s, L> {
-    entries: &'s [f64],
-    loads: L,
+struct Combine<'s, R> {
+    rows: R,
     sums: &'s mut [f64],
 }
 
-impl<L: Iterator<Item = (usize, f64)>> Kernel for Combine<'_, L> {
+impl<'a, R: Iterator<Item = (&'a [f64], f64)>> Kernel for Combine<'_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { entries, mut loads, sums } = self;
+        let Self { mut rows, sums } = self;
         sums.fill(0.0);
-        let length = sums.len();
         // Four rows at a time, so that each sum is loaded and stored once for them.
-        while let Some((first, a)) = loads.next() {
-            let [(second, b), (third, c), (fourth, d)] = [(); 3].map(|()| loads.next().unwrap_or((first, 0.0)));
-            let row = |i: usize| &entries[i * length..(i + 1) * length];
-            let rows = row(first).iter().zip(row(second)).zip(row(third)).zip(row(fourth));
-            for (sum, (((w, x), y), z)) in sums.iter_mut().zip(rows) {
+        while let Some((first, a)) = rows.next() {
+            let [(second, b), (third, c), (fourth, d)] = [(); 3].map(|()| rows.next().unwrap_or((first, 0.0)));
+            let four = first.iter().zip(second).zip(third).zip(fourth);
+            for (sum, (((w, x), y), z)) in sums.iter_mut().zip(four) {
                 *sum += (a * w + b * x) + (c * y + d * z);
             }
         }

@@ -118,9 +118,9 @@ impl BlendedRows {
     /// Sets `deepened` to how much row `i`, and those before it, give way to a newton on row `i` (m/N).
     pub fn respond(&mut self, i: usize, deepened: &mut [f64]) {
         let Self { rows, compliance, response, .. } = self;
-        let row = &rows[i];
-        let loads = row.slots.iter().zip(row.values).map(|(slot, value)| (*slot as usize, value));
-        combine(compliance, loads, response);
+        let (row, count) = (&rows[i], response.len());
+        let entries = |slot: &u32| &compliance[*slot as usize * count..][..count];
+        combine(row.slots.iter().map(entries).zip(row.values), response);
         deepened.iter_mut().zip(&*rows).for_each(|(deepened, other)| *deepened = other.sum(response));
     }
 
