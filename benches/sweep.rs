@@ -256,7 +256,8 @@ fn curves(root: &Path, scene: &Scene) -> Result<(), Box<dyn Error>> {
         let (solved, equilibria) = quickest(|| backend.solve(&left));
         equilibria?;
         let time = found + solved;
-        let (skipped, all) = (free_space.skipped(), free_space.skipped() + left.len());
+        let skipped = free_space.points().filter(|&point| free_space.gap(point).is_some()).count();
+        let all = skipped + left.len();
         let each = 1e6 * time / all as f64;
         println!("  {:>9} points, {all:>8} free, {skipped:>8} of them skipped {each:>6.2} us each", grid.points());
         free_points.push((grid.points() as f64 / 1e6, each));

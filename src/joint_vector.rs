@@ -77,6 +77,17 @@ impl JointVector {
     }
 }
 
+/// Numbers beyond [`MAX_JOINTS`] are cut.
+impl FromIterator<f64> for JointVector {
+    fn from_iter<I: IntoIterator<Item = f64>>(numbers: I) -> Self {
+        let mut vector = Self::default();
+        for (entry, number) in vector.values.iter_mut().zip(numbers) {
+            (*entry, vector.len) = (number, vector.len + 1);
+        }
+        vector
+    }
+}
+
 impl Deref for JointVector {
     type Target = [f64];
     fn deref(&self) -> &[f64] {

@@ -172,7 +172,7 @@ impl Dataset {
     #[getter]
     fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(store) = &self.dataset.refinement else { return Ok(None) };
-        let (nodes, joints) = (store.nodes(), store.space().joints());
+        let (nodes, joints) = (store.nodes().collect::<Vec<_>>(), store.space().joints());
         let count = nodes.len();
         let vectors = |of: fn(&StoredNode) -> &JointVector| -> Vec<f64> {
             nodes.iter().flat_map(|node| of(node).iter().copied().take(joints)).collect()

@@ -22,7 +22,7 @@ use crate::{
         slices::Plane,
     },
     scene::{self, AxisSpec, GRID_STEP_SLACK, GridSpec, HapticsSpec, Interpolation, Scene},
-    sweep::{Inspection, build_object},
+    sweep::{Clearance, Inspection, build_object},
 };
 use glam::DVec3;
 use serde::Serialize;
@@ -120,6 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let inspected = Inspected {
         page,
+        clearance: solved.proxy_nodes.iter().all(|node| node.contact.is_none()).then(|| Clearance::near(&model, q)),
         interpolated: dataset.map(|dataset| Interpolated::new(dataset, &scene.haptics, &solved)).transpose()?,
         stored: dataset.and_then(|dataset| Stored::new(dataset, q)),
         lattice: object.lattice_error(&model.compliance),
@@ -140,6 +141,9 @@ struct Inspected {
     solved: Inspection,
     warnings: Vec<String>,
     object_warnings: Vec<String>,
+    /// Where nothing touches: what is nearest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clearance: Option<Clearance>,
     #[serde(flatten)]
     body: Body,
     /// Where a lattice fills the object: the error that it makes.
@@ -262,6 +266,7 @@ impl Describe for Inspected {
         text.row("torque", efforts(torque));
         text.row("energy", format_args!("{energy:.6} J"));
         text.row("gap", format_args!("{:.3} mm to the surface at rest", gap * 1e3));
+        self.clearance.iter().for_each(|clearance| text.row("nearest", clearance));
         if let Some(dent) = dent {
             text.row("dent", format_args!("{:.1} mm, over which an arm that slides leaves it", dent * 1e3));
         }

@@ -10,7 +10,7 @@ use super::{
     tell, watch,
 };
 use crate::names::counted;
-use crate::sweep::{Merge, Merged, Progress, ranges};
+use crate::sweep::{Merge, Progress, ranges};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -52,13 +52,12 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     let stop = interrupt::stop_flag();
     let bar = Bar::new("points", "{wide_bar} {pos}/{len} points, {msg}");
     let mut progress = |progress: Progress| bar.set(progress.done as u64, progress.points as u64, String::new(), None);
-    let merged = merge.to_file(output, arguments.measure_error, stop, &mut progress);
+    let report = merge.to_file(output, arguments.measure_error, stop, &mut progress);
     bar.finish();
     interrupt::over();
-    let Merged { shards, report } = merged?;
-    let mut baked = Baked::new(report, output, None, earlier)?;
+    let mut baked = Baked::new(report?, output, None, earlier)?;
     let is_whole = baked.is_whole(arguments.allow_free);
-    Report::of(&MergedShards { baked, shards, missing: "" }, is_whole)
+    Report::of(&MergedShards { baked, shards: merge.count(), missing: "" }, is_whole)
 }
 
 /// A dataset put together.

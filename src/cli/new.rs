@@ -142,6 +142,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     };
     let missing = files.iter().map(missing).collect::<Result<Vec<_>, _>>()?;
     for ((path, text), _) in files.iter().zip(&missing).filter(|(_, missing)| **missing) {
+        output::probe(path, path.parent().unwrap_or(Path::new("")))?;
         replace_file(path, |out| out.write_all(text.as_bytes()))
             .map_err(|error| format!("cannot write {}: {error}; give another place by -o", path.display()))?;
     }

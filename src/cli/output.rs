@@ -296,7 +296,7 @@ impl Describe for Overwritten {
 }
 
 /// Checks that `folder`, in which `output` is to be, can be written to: before an hour's work, not after it.
-fn probe(output: &Path, folder: &Path) -> Result<(), Failure> {
+pub fn probe(output: &Path, folder: &Path) -> Result<(), Failure> {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     tempfile::tempfile_in(folder).map(drop).map_err(|error| {
         let (output, folder) = (output.display(), folder.display());

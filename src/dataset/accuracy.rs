@@ -244,15 +244,9 @@ mod tests {
         let measured = MeasuredError {
             configurations: 3,
             torque: 10.0,
-            unit: NormUnit::default(),
             interpolation: "potential".into(),
             errors: vec![error, other],
-            left_out: 0,
-            cut: None,
-            geometry: None,
-            rounding: None,
-            rounded: None,
-            friction: None,
+            ..MeasuredError::default()
         };
         assert!((measured.relative().unwrap() - 0.01).abs() < 1e-15);
         assert!(measured.keeps(0.011) && !measured.keeps(0.009));

@@ -9,11 +9,21 @@ use safetensors::Dtype;
 
 const TOO_MANY_POINTS: &str = "the grid has too many points";
 
+/// Checks the grid, and that all columns are as long as it asks for; `Err` says what is wrong.
+pub(crate) fn lengths(dataset: &Dataset) -> Result<(), String> {
+    let points = dataset.grid.check()?;
+    let arrays = Stored::all().filter_map(|array| Some((array, dataset.stored(array)?)));
+    arrays.map(|(array, bytes)| length(array, bytes, &dataset.grid)).collect::<Result<(), _>>()?;
+    let offsets = dataset.contacts.as_ref().map(|contacts| contacts.offsets.len());
+    offsets
+        .map_or(Ok(()), |found| exactly(Stored::ContactOffsets, found, points.checked_add(1).ok_or(TOO_MANY_POINTS)?))
+}
+
 /// `Err` says what is wrong.
 pub(super) fn check(dataset: &Dataset) -> Result<(), String> {
-    let points = dataset.grid.check()?;
+    lengths(dataset)?;
+    let points = dataset.grid.points();
     for (array, bytes) in Stored::all().filter_map(|array| Some((array, dataset.stored(array)?))) {
-        length(array, bytes, &dataset.grid)?;
         match array.description().dtype {
             Dtype::F64 => finite(array, bytemuck::cast_slice(bytes), |x: &f64| x.is_finite())?,
             Dtype::F32 => finite(array, bytemuck::cast_slice(bytes), |x: &f32| x.is_finite())?,
@@ -54,7 +64,6 @@ fn check_surface(surface: &Surface) -> Result<(), String> {
 
 fn check_contacts(contacts: &Contacts, points: usize) -> Result<(), String> {
     let Contacts { offsets, nodes, forces } = contacts;
-    exactly(Stored::ContactOffsets, offsets.len(), points.checked_add(1).ok_or(TOO_MANY_POINTS)?)?;
     exactly(Stored::ContactForces, forces.len(), nodes.len().checked_mul(3).ok_or("there are too many contacts")?)?;
     let (ends, at) = (Stored::ContactOffsets.name(), Stored::ContactNodes.name());
     if offsets[0] != 0 || offsets[points] != nodes.len() as u64 {

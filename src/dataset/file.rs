@@ -202,7 +202,7 @@ impl Dataset {
     pub fn save(&self, path: &Path) -> Result<(), Error> {
         check_place(path)?;
         check::check(self).map_err(|reason| inconsistent(path, reason))?;
-        let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene };
+        let heading = Heading { grid: &self.grid, provenance: &self.provenance, scene: &self.scene, store: None };
         if let Some(store) = &self.refinement {
             return store::file::save(store, heading, self.surface.as_ref(), path);
         }
@@ -216,32 +216,19 @@ pub(crate) struct Heading<'a> {
     pub(crate) grid: &'a Grid,
     pub(crate) provenance: &'a Provenance,
     pub(crate) scene: &'a str,
-}
-
-/// Kind of a file.
-#[derive(Clone, Copy)]
-pub(crate) struct Kind<'a> {
-    /// Its name and version.
-    pub(crate) format: &'static str,
     /// See [`Metadata::store`].
     pub(crate) store: Option<&'a str>,
 }
 
 /// Writes a dataset's file, replacing the one at `path` whole or not at all. The tensors may be in any order.
-pub(crate) fn write_file<C: Contents>(path: &Path, heading: Heading<'_>, tensors: Vec<Tensor<C>>) -> Result<(), Error> {
-    write_container(path, Kind { format: FORMAT, store: None }, heading, tensors)
-}
-
-/// Writes a file of any kind in the dataset's container, as [`write_file`] does.
-pub(crate) fn write_container<C: Contents>(
+pub(crate) fn write_file<C: Contents>(
     path: &Path,
-    kind: Kind<'_>,
     heading: Heading<'_>,
     mut tensors: Vec<Tensor<C>>,
 ) -> Result<(), Error> {
     let inconsistent = |reason: String| inconsistent(path, reason);
     tensors.sort_by_key(|tensor| std::cmp::Reverse(tensor.dtype.bitsize()));
-    let mut text = header(kind, heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
+    let mut text = header(heading, &tensors).map_err(|error| inconsistent(error.to_string()))?;
     text.resize((LENGTH + text.len()).next_multiple_of(PAGE) - LENGTH, b' ');
     if text.len() > MAX_HEADER {
         return Err(inconsistent(format!("its header, scene included, is longer than {MAX_HEADER} bytes")));
@@ -306,7 +293,7 @@ impl Write for Placed<'_> {
     }
 }
 
-fn header<C>(kind: Kind<'_>, heading: Heading<'_>, tensors: &[Tensor<C>]) -> serde_json::Result<Vec<u8>> {
+fn header<C>(heading: Heading<'_>, tensors: &[Tensor<C>]) -> serde_json::Result<Vec<u8>> {
     let mut end = 0;
     let infos = tensors.iter().map(|tensor| {
         let start = end;
@@ -316,11 +303,11 @@ fn header<C>(kind: Kind<'_>, heading: Heading<'_>, tensors: &[Tensor<C>]) -> ser
     serde_json::to_vec(&Header {
         metadata: Metadata {
             checksum: NO_CHECKSUM.into(),
-            format: kind.format.into(),
+            format: if heading.store.is_some() { store::file::FORMAT } else { FORMAT }.into(),
             grid: serde_json::to_string(heading.grid)?,
             provenance: serde_json::to_string(heading.provenance)?,
             scene: heading.scene.into(),
-            store: kind.store.map(str::to_owned),
+            store: heading.store.map(str::to_owned),
         },
         tensors: infos.collect(),
     })

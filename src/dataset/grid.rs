@@ -174,21 +174,13 @@ impl Grid {
     /// The configuration of the grid's range that is nearest to `q`, joint by joint.
     #[must_use]
     pub fn clamp(&self, q: &JointVector) -> JointVector {
-        let mut inside = *q;
-        for (x, axis) in inside.iter_mut().zip(&self.axes) {
-            *x = x.max(axis.start).min(axis.last());
-        }
-        inside
+        q.iter().zip(&self.axes).map(|(x, axis)| x.max(axis.start).min(axis.last())).collect()
     }
 
     /// Configuration q of grid point `point`.
     #[must_use]
     pub fn configuration(&self, point: usize) -> JointVector {
-        let mut q = JointVector::zeros(self.joints());
-        for ((value, axis), line) in q.iter_mut().zip(&self.axes).zip(self.lines(point)) {
-            *value = axis.coordinate(line);
-        }
-        q
+        self.axes.iter().zip(self.lines(point)).map(|(axis, line)| axis.coordinate(line)).collect()
     }
 }
 

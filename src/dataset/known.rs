@@ -24,10 +24,8 @@ impl Dataset {
     pub fn of_half_space(grid: Grid, normal: &JointVector, stiffness: f64) -> Self {
         Self::of_field(grid, |q| {
             let depth = q.dot(normal).max(0.0);
-            let mut torque = *normal;
-            torque.iter_mut().for_each(|part| *part *= -stiffness * depth);
             let status = if depth > 0.0 { Status::Contact } else { Status::Free };
-            (torque, 0.5 * stiffness * depth * depth, status)
+            (normal.scaled(-stiffness * depth), 0.5 * stiffness * depth * depth, status)
         })
     }
 }

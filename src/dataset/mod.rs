@@ -8,7 +8,7 @@
 mod accuracy;
 mod agreement;
 mod atomic;
-mod check;
+pub(crate) mod check;
 mod column;
 mod error;
 mod export;
@@ -30,11 +30,12 @@ pub use atomic::{Replacement, discard_unfinished, replace_file, resolved};
 pub use column::Column;
 pub use export::Format;
 pub(crate) use file::{
-    Contents as TensorContents, Element, Heading, Kind, PIECE_BUFFER, Tensor, check_place, may_be_dataset,
-    surface_tensors, write_container, write_file,
+    Contents as TensorContents, Element, Heading, PIECE_BUFFER, Tensor, check_place, may_be_dataset, surface_tensors,
+    write_file,
 };
 pub use grid::{Axis, Grid, JointLabel};
 pub use stencil::Stencil;
+pub(crate) use stencil::corners;
 pub(crate) use stored::{Extras, RESULTS, Source, Stored};
 pub use summary::{Refinement, StatusCounts, Summary};
 

@@ -4,7 +4,10 @@
 //! nearest cell's face is used, and `fade` falls linearly from one to zero over one cell, so that whatever is
 //! multiplied by it stays continuous. Nothing here allocates; the cost depends on the number of joints alone.
 
-use super::{Axis, Grid};
+use super::{
+    Axis, Grid,
+    store::{self, Cell, with_joints},
+};
 use crate::MAX_AXES;
 
 /// Corners of a cell with the greatest number of joints.
@@ -68,30 +71,13 @@ impl Grid {
     /// not finite is outside, with `fade` zero.
     #[must_use]
     pub fn locate(&self, q: &[f64]) -> Stencil {
-        let mut stencil = Stencil {
-            count: 1,
-            points: [0; MAX_CORNERS],
-            weights: [0.0; MAX_CORNERS],
-            fractions: [0.0; MAX_AXES],
-            fade: 1.0,
-        };
-        stencil.weights[0] = 1.0;
-        for ((axis, &coordinate), kept) in self.axes.iter().zip(q).zip(&mut stencil.fractions) {
-            stencil.fade = stencil.fade.min(axis.fade(coordinate));
-            let (low, fraction) = axis.cell(coordinate);
-            *kept = fraction;
-            let (half, beyond) = (stencil.count, usize::from(axis.count > 1));
-            for corner in 0..half {
-                let point = stencil.points[corner] * axis.count + low;
-                let weight = stencil.weights[corner];
-                stencil.points[corner] = point;
-                stencil.points[corner + half] = point + beyond;
-                stencil.weights[corner] = weight * (1.0 - fraction);
-                stencil.weights[corner + half] = weight * fraction;
-            }
-            stencil.count = 2 * half;
-        }
-        stencil
+        let Cell { low, fractions } = Cell::of(self, q);
+        let (mut points, mut weights) = ([0; MAX_CORNERS], [0.0; MAX_CORNERS]);
+        with_joints!(self.joints(), D => {
+            points[..1 << D].copy_from_slice(&corners::<{ 1 << D }>(&self.axes, &low));
+            weights[..1 << D].copy_from_slice(&store::weights::<{ 1 << D }>(&fractions));
+        });
+        Stencil { count: 1 << self.joints(), points, weights, fractions, fade: self.fade(q) }
     }
 
     /// Multilinear interpolation of `column`, one entry a grid point, at `q`; not a number outside the grid, where
@@ -104,6 +90,20 @@ impl Grid {
         }
         stencil.corners().map(|(point, weight)| weight * f64::from(column[point])).sum()
     }
+}
+
+/// The points at the corners of the cell of a grid of `axes` whose first corner lies on the lines `low`.
+#[inline]
+pub(crate) fn corners<const C: usize>(axes: &[Axis], low: &[u32]) -> [usize; C] {
+    let mut points = [0; C];
+    for (a, (axis, &low)) in axes.iter().zip(low).enumerate() {
+        let (near, far) = points.split_at_mut(1 << a);
+        for (near, far) in near.iter_mut().zip(far) {
+            *near = *near * axis.count + low as usize;
+            *far = *near + usize::from(axis.count > 1);
+        }
+    }
+    points
 }
 
 impl Stencil {

@@ -41,42 +41,33 @@ pub(crate) struct Description {
     pub dtype: Dtype,
     pub axes: Axes,
     pub unit: Unit,
-    /// What a sweep stores it for; `None` where it always does.
-    pub extra: Option<Extra>,
+    /// Whether a sweep stores it.
+    stores: fn(Extras) -> bool,
     /// What a dataset without it lacks, in words, where that is worth saying.
     pub absent: Option<&'static str>,
 }
 
 /// What a sweep stores some arrays for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Extra {
-    /// Interpolation by tangents.
-    Tangent,
-    /// Friction.
-    Slip,
-    /// Contact forces on the object's nodes.
-    Forces,
-}
-
-/// Which of them a sweep stores arrays for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Extras {
+    /// Interpolation by tangents.
     pub tangent: bool,
+    /// Friction.
     pub slip: bool,
+    /// Contact forces on the object's nodes.
     pub forces: bool,
 }
 
 impl Extras {
     /// Whether an array is stored.
     pub fn store(self, array: Stored) -> bool {
-        match array.description().extra {
-            None => true,
-            Some(Extra::Tangent) => self.tangent,
-            Some(Extra::Slip) => self.slip,
-            Some(Extra::Forces) => self.forces,
-        }
+        (array.description().stores)(self)
     }
 }
+
+const TANGENT: fn(Extras) -> bool = |extras| extras.tangent;
+const SLIP: fn(Extras) -> bool = |extras| extras.slip;
+const FORCES: fn(Extras) -> bool = |extras| extras.forces;
 
 /// The arrays that a sweep makes, point by point.
 pub(crate) const RESULTS: [Stored; 12] = {
@@ -124,18 +115,18 @@ const NODE: &[(&str, usize)] = &[("node", 0), ("xyz", 3)];
 const DESCRIPTIONS: [Description; 18] = [
     of(Torque, "torque", Dtype::F64, Axes::Joints("joint"), Unit::Effort),
     of(Energy, "energy", Dtype::F64, Axes::Grid, Unit::Of("J")).or_absent("stored energy"),
-    of(Tangent, "tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness).with(Extra::Tangent),
-    of(NormalForce, "normal_force", Dtype::F32, Axes::Grid, Unit::Of("N")).with(Extra::Slip),
-    of(SlipJacobian, "slip_jacobian", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Slip).with(Extra::Slip),
+    of(Tangent, "tangent", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Stiffness).with(TANGENT),
+    of(NormalForce, "normal_force", Dtype::F32, Axes::Grid, Unit::Of("N")).with(SLIP),
+    of(SlipJacobian, "slip_jacobian", Dtype::F32, Axes::Triangle("lower triangle"), Unit::Slip).with(SLIP),
     of(Gap, "gap", Dtype::F32, Axes::Grid, Unit::Of("m")).or_absent("gap"),
     of(Status, "status", Dtype::U8, Axes::Grid, Unit::Of("1")),
     of(Residual, "residual", Dtype::F32, Axes::Grid, Unit::Of("1")).or_absent("residuals"),
     of(Iterations, "iterations", Dtype::U32, Axes::Grid, Unit::Of("1")),
     of(ContactOffsets, "contact_offsets", Dtype::U64, Axes::Own(POINT), Unit::Of("1"))
-        .with(Extra::Forces)
+        .with(FORCES)
         .or_absent("contact forces"),
-    of(ContactNodes, "contact_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")).with(Extra::Forces),
-    of(ContactForces, "contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")).with(Extra::Forces),
+    of(ContactNodes, "contact_nodes", Dtype::U32, Axes::Own(ENTRY), Unit::Of("1")).with(FORCES),
+    of(ContactForces, "contact_forces", Dtype::F32, Axes::Own(VECTOR), Unit::Of("N")).with(FORCES),
     of(SurfaceNodes, "surface_nodes", Dtype::F64, Axes::Own(NODE), Unit::Of("m")).or_absent("the object's surface"),
     of(SurfaceTriangles, "surface_triangles", Dtype::U32, Axes::Own(&[("triangle", 0), ("corner", 3)]), Unit::Of("1")),
     of(InnerNodes, "inner_nodes", Dtype::F64, Axes::Own(&[("inner node", 0), ("xyz", 3)]), Unit::Of("m")),
@@ -145,12 +136,12 @@ const DESCRIPTIONS: [Description; 18] = [
 ];
 
 const fn of(array: Stored, name: &'static str, dtype: Dtype, axes: Axes, unit: Unit) -> Description {
-    Description { array, name, dtype, axes, unit, extra: None, absent: None }
+    Description { array, name, dtype, axes, unit, stores: |_| true, absent: None }
 }
 
 impl Description {
-    const fn with(self, extra: Extra) -> Self {
-        Self { extra: Some(extra), ..self }
+    const fn with(self, stores: fn(Extras) -> bool) -> Self {
+        Self { stores, ..self }
     }
 
     const fn or_absent(self, absent: &'static str) -> Self {

@@ -50,11 +50,7 @@ pub struct Refinement {
 impl Refinement {
     fn of(store: &Store) -> Self {
         let mut nodes = vec![0; store.space().levels() as usize];
-        for (key, block) in store.blocks() {
-            if let Some((level, _)) = store.space().block(key) {
-                nodes[level as usize] += block.nodes().count();
-            }
-        }
+        store.nodes().for_each(|node| nodes[node.level as usize] += 1);
         Self { nodes, bytes: store.bytes() }
     }
 }
@@ -123,7 +119,10 @@ impl Dataset {
             torque,
             max_energy: self.energy.as_ref().map(|energy| converged().map(|point| energy[point]).fold(0.0, f64::max)),
             max_depth: self.gap.as_ref().map(|gap| -f64::from(gap.iter().copied().fold(f32::INFINITY, f32::min))),
-            max_residual: self.max_residual(),
+            max_residual: self
+                .residual
+                .as_ref()
+                .map(|all| converged().map(|point| all[point].into()).fold(0.0, f64::max)),
             contacts: self.contacts.as_ref().map(|contacts| contacts.nodes.len()),
             max_contacts: rows.map(|rows| rows.max().unwrap_or(0) as usize),
             max_force: self.contacts.as_ref().map(|_| converged().map(force).fold(0.0, f64::max)),
@@ -132,13 +131,5 @@ impl Dataset {
             refinement,
             provenance: self.provenance.clone(),
         }
-    }
-
-    /// Greatest residual of a converged point in contact (1); `None` where residuals are not stored.
-    #[must_use]
-    pub fn max_residual(&self) -> Option<f64> {
-        let residual = self.residual.as_ref()?;
-        let converged = (0..residual.len()).filter(|&point| self.status(point) == Status::Contact);
-        Some(converged.map(|point| residual[point].into()).fold(0.0, f64::max))
     }
 }

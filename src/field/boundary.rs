@@ -53,8 +53,7 @@ impl BoundaryLayer {
     /// A layer of slope `slope` Ks, one positive number per joint (N m/rad).
     #[must_use]
     pub fn new(grid: &Grid, slope: &JointVector) -> Self {
-        let mut compliance = *slope;
-        compliance.iter_mut().for_each(|slope| *slope = 1.0 / *slope);
+        let compliance: JointVector = slope.iter().map(|slope| 1.0 / slope).collect();
         let density = grid.axes.iter().zip(compliance.iter()).map(|(axis, c)| c / (axis.step * axis.step)).sum::<f64>();
         Self { compliance, density: density.sqrt() }
     }

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     Error, JointVector,
     contact::RESIDUAL_FLOOR,
-    dataset::{Axis, Grid},
+    dataset::{Grid, corners},
     error, memory,
     store::{Cell, Gathered, Levels, Place, Root, record::width, weights, with_joints},
 };
@@ -126,20 +126,6 @@ impl GridRoot {
         let share = if depth < linear { depth / linear } else { 1.0 };
         Around { share, ..Around::of(&self.points, fade, corners()) }
     }
-}
-
-/// The points at the corners of the cell of a grid of `axes` whose first corner lies on the lines `low`.
-#[inline]
-pub(super) fn corners<const C: usize>(axes: &[Axis], low: &[u32]) -> [usize; C] {
-    let mut points = [0; C];
-    for (a, (axis, &low)) in axes.iter().zip(low).enumerate() {
-        let (near, far) = points.split_at_mut(1 << a);
-        for (near, far) in near.iter_mut().zip(far) {
-            *near = *near * axis.count + low as usize;
-            *far = *near + usize::from(axis.count > 1);
-        }
-    }
-    points
 }
 
 /// The change of `number` at `point` of `grid` in a step along `axis`, between the neighbours that have one: central, or

@@ -11,12 +11,11 @@
 use super::{
     Flags, Interpolant, Sample, Tables,
     boundary::BoundaryLayer,
-    grid_root::corners,
     points::{Around, Checked, Point},
 };
 use crate::{
     Error, JointVector,
-    dataset::{Axis, Grid},
+    dataset::{Axis, Grid, corners},
     store::{Cell, weights, with_joints},
 };
 

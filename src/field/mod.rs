@@ -25,7 +25,6 @@ pub mod range;
 mod slip;
 mod slope;
 mod stiffness;
-mod work;
 
 pub use batch::{check_rows, fill_rows};
 pub use flags::Flags;

@@ -5,7 +5,7 @@ use super::{Flags, Sample, unfit};
 use crate::{
     Error, JointVector,
     contact::Status,
-    dataset::{Dataset, Grid},
+    dataset::{Dataset, Grid, check::lengths},
     input::GREATEST_INPUT,
     joint_matrix, memory,
 };
@@ -110,21 +110,8 @@ pub(super) struct Checked<'a> {
 impl<'a> Checked<'a> {
     /// Checks `dataset`.
     pub fn new(dataset: &'a Dataset) -> Result<Self, Error> {
+        lengths(dataset).map_err(|what| unfit(format!("the dataset's {what}: bake it again")))?;
         let (grid, count) = (&dataset.grid, dataset.grid.points());
-        expect("torque", count.saturating_mul(grid.joints()), dataset.torque.len())?;
-        expect("status", count, dataset.status.len())?;
-        if let Some(energy) = &dataset.energy {
-            expect("energy", count, energy.len())?;
-        }
-        if let Some(tangent) = &dataset.tangent {
-            expect("tangent", count.saturating_mul(joint_matrix::entries(grid.joints())), tangent.len())?;
-        }
-        if let Some(gap) = &dataset.gap {
-            expect("gap", count, gap.len())?;
-        }
-        if let Some(contacts) = &dataset.contacts {
-            expect("contact offsets", count + 1, contacts.offsets.len())?;
-        }
         // Facts of each point and the number of another, and what is found from these beside them.
         memory::check(count.saturating_mul(2 * (size_of::<Point>() + size_of::<usize>())))
             .map_err(|shortage| unfit(format!("the dataset's {count} grid points: {shortage}")))?;
@@ -159,13 +146,6 @@ impl<'a> Checked<'a> {
         plausible("energy", source, energy)?;
         Ok(energy)
     }
-}
-
-pub(super) fn expect(column: &str, expected: usize, found: usize) -> Result<(), Error> {
-    if expected == found {
-        return Ok(());
-    }
-    Err(unfit(format!("the dataset's {column} has {found} entries where its grid asks for {expected}: bake it again")))
 }
 
 /// Whether `value` of `column` may enter the loop.

@@ -24,7 +24,7 @@ use super::{
 };
 use crate::{
     JointVector,
-    dataset::Grid,
+    dataset::{Axis, Grid},
     store::{Cell, Levels, Place, Root, Store, added, beyond, root},
 };
 use rayon::prelude::*;
@@ -131,9 +131,6 @@ fn of_cell(base: &Grid, slopes: &JointVector, level: u32, root: &Bernstein) -> S
     if root.greatest() <= 0.0 {
         return Stiffness::default();
     }
-    let mut per_step = JointVector::zeros(slopes.len());
-    for (per_step, axis) in per_step.iter_mut().zip(&base.axes) {
-        *per_step = if axis.count > 1 { f64::from(1_u32 << level) / axis.step } else { 0.0 };
-    }
-    root.bounds(&per_step).stiffness(slopes)
+    let per_step = |axis: &Axis| if axis.count > 1 { f64::from(1_u32 << level) / axis.step } else { 0.0 };
+    root.bounds(&base.axes.iter().map(per_step).collect()).stiffness(slopes)
 }

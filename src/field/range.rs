@@ -128,8 +128,7 @@ impl HaptizedRange {
                 }
                 None => {
                     let steps = Generations::new(grid, |point| data.points[data.nearest[point]].in_contact).steps;
-                    let mut levers = JointVector::zeros(grid.joints());
-                    levers.iter_mut().zip(&grid.axes).for_each(|(lever, axis)| *lever = 1.0 / axis.step);
+                    let levers = grid.axes.iter().map(|axis| 1.0 / axis.step).collect();
                     let clearances = steps.into_iter().map(|steps| steps as f32).collect();
                     Beyond { open, clearances, levers, object: None }
                 }

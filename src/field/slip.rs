@@ -6,13 +6,13 @@
 //! the torque itself is interpolated and held behind a boundary layer, there is no w_bar: so is the normal force then.
 
 use super::{
-    grid_root::{LEAST_ENERGY, corners},
-    points::{Checked, Generations, expect, plausible},
+    grid_root::LEAST_ENERGY,
+    points::{Checked, Generations, plausible},
 };
 use crate::{
     Error,
     contact::Slip,
-    dataset::{Grid, SlipColumns},
+    dataset::{Grid, SlipColumns, corners},
     joint_matrix::entries,
     store::{
         Cell, Store,
@@ -59,8 +59,6 @@ impl GridSlips {
     pub fn new(data: &Checked<'_>, slip: &SlipColumns, is_potential: bool) -> Result<Self, Error> {
         let (grid, count) = (&data.dataset.grid, data.points.len());
         let (wide, entries) = (width(grid.joints()), entries(grid.joints()));
-        expect("normal force", count, slip.normal_force.len())?;
-        expect("slip Jacobian", count.saturating_mul(entries), slip.jacobian.len())?;
         let mut records = vec![0.0; count * wide];
         let mut known = vec![false; count];
         for point in 0..count {

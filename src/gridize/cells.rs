@@ -146,11 +146,15 @@ impl Cells {
         Ok(())
     }
 
+    /// One direction of a cell.
+    fn branch(&mut self, key: Key, direction: LeadDirection) -> &mut Branch {
+        let branches = self.cells.entry(key).or_default();
+        branches[direction as usize].get_or_insert_with(|| Branch::new(self.joints))
+    }
+
     /// Adds a row for itself, which counts by its `weight`.
     pub fn add_alone(&mut self, q: &JointVector, torque: &JointVector, weight: f64) {
-        let (key, joints) = (self.key(q), self.joints);
-        let branch = self.cells.entry(key).or_default()[LeadDirection::Forward as usize]
-            .get_or_insert_with(|| Branch::new(joints));
+        let branch = self.branch(self.key(q), LeadDirection::Forward);
         branch.q.add(q, weight);
         branch.torque.add(torque, weight);
     }
@@ -158,9 +162,7 @@ impl Cells {
     /// The motion was interrupted: what follows is another visit.
     pub fn end_visit(&mut self) {
         let Some(visit) = self.visit.take() else { return };
-        let joints = self.joints;
-        let branch = &mut self.cells.entry(visit.key).or_default()[visit.direction as usize];
-        let branch = branch.get_or_insert_with(|| Branch::new(joints));
+        let branch = self.branch(visit.key, visit.direction);
         branch.q.add(&visit.q.mean, 1.0);
         branch.torque.add(&visit.torque.mean, 1.0);
         for (joint, sum) in branch.within.iter_mut().enumerate() {

@@ -211,9 +211,8 @@ fn frame(samples: &Samples) -> Result<(Position, Position), Error> {
     let mut low = [0.0; MAX_AXES];
     let mut extent = [0.0; MAX_AXES];
     for joint in 0..joints {
-        let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
-        low[joint] = column().fold(f64::INFINITY, f64::min);
-        extent[joint] = column().fold(f64::NEG_INFINITY, f64::max) - low[joint];
+        let [least, greatest] = samples.range(joint);
+        (low[joint], extent[joint]) = (least, greatest - least);
         if !extent[joint].is_finite() || extent[joint] <= f64::MIN_POSITIVE {
             let joint = &samples.joints[joint].name;
             return Err(error!(
@@ -266,9 +265,9 @@ pub(super) fn dot(a: &Position, b: &Position) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Distance of two positions.
-pub(super) fn distance(a: &Position, b: &Position) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
+/// Squared distance of two positions.
+pub(super) fn distance_squared(a: &Position, b: &Position) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
 }
 
 /// `position` moved along each axis by a hash of its coordinates, by at most `most`.

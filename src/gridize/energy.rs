@@ -12,7 +12,7 @@
 
 use crate::{
     contact::{Status, linear::support::dot},
-    dataset::{Dataset, Grid},
+    dataset::Dataset,
 };
 use std::collections::BTreeMap;
 
@@ -34,31 +34,28 @@ pub fn with_energy(dataset: Dataset) -> Dataset {
     if dataset.energy.is_some() {
         return dataset;
     }
-    let energy = energy(&dataset.grid, &dataset.torque, &dataset.status);
+    let energy = energy(&dataset);
     Dataset { energy: Some(energy.into()), ..dataset }
 }
 
-/// Returns U at every point of `grid` (J); `torque` and `status` as in a dataset.
-fn energy(grid: &Grid, torque: &[f64], status: &[u8]) -> Vec<f64> {
-    let touches = |point: usize| status[point] == Status::Contact as u8;
-    let mut differences = Vec::new();
-    for point in (0..grid.points()).filter(|&point| touches(point)) {
-        for axis in 0..grid.joints() {
-            differences.extend(beside(grid, torque, status, point, axis));
-        }
-    }
-    let onset = |point| {
-        let ways = (0..grid.joints()).flat_map(|axis| [(axis, 0), (axis, 1)]);
-        ways.map(|(axis, side)| onset(grid, torque, status, point, axis, side)).fold(0.0, f64::max)
+/// Returns U at every point of `dataset` (J).
+fn energy(dataset: &Dataset) -> Vec<f64> {
+    let (points, joints) = (dataset.grid.points(), dataset.grid.joints());
+    let touching: Vec<usize> = (0..points).filter(|&point| dataset.status(point) == Status::Contact).collect();
+    let ways = |point: usize| (0..joints).map(move |axis| (point, axis));
+    let mut differences: Vec<Difference> =
+        touching.iter().flat_map(|&point| ways(point)).flat_map(|(point, axis)| beside(dataset, point, axis)).collect();
+    let onset = |point: usize| {
+        let onsets = ways(point).flat_map(|(point, axis)| [0, 1].map(|side| onset(dataset, point, axis, side)));
+        onsets.fold(0.0, f64::max)
     };
-    let size = |point: usize| norm(torque, grid.joints(), point);
-    let touching: Vec<usize> = (0..grid.points()).filter(|&point| touches(point)).collect();
-    let adrift = adrift(grid.points(), &differences, &touching, size);
+    let size = |point: usize| dataset.torque(point).iter().map(|tau| tau * tau).sum::<f64>().sqrt();
+    let adrift = adrift(points, &differences, &touching, size);
     differences.extend(adrift.into_iter().map(|second| Difference { first: None, second, value: onset(second) }));
-    let mut energy = solve(grid.points(), &differences);
-    let stiffest: Vec<f64> = (0..grid.joints()).map(|axis| stiffest(grid, torque, status, axis)).collect();
+    let mut energy = solve(points, &differences);
+    let stiffest: Vec<f64> = (0..joints).map(|axis| stiffest(dataset, &touching, axis)).collect();
     for point in touching {
-        let held = torque[point * grid.joints()..].iter().zip(&stiffest).filter(|(_, stiffness)| **stiffness > 0.0);
+        let held = dataset.torque(point).iter().zip(&stiffest).filter(|(_, stiffness)| **stiffness > 0.0);
         energy[point] = held.map(|(tau, stiffness)| 0.5 * tau * tau / stiffness).fold(energy[point], f64::max);
     }
     energy
@@ -93,58 +90,44 @@ fn adrift(points: usize, differences: &[Difference], touching: &[usize], size: i
     least.into_values().collect()
 }
 
-/// Greatest change of the torque along `axis` between neighbours that were measured, of which one touches at least (N m/rad
-/// or N/m).
-fn stiffest(grid: &Grid, torque: &[f64], status: &[u8], axis: usize) -> f64 {
-    let joints = grid.joints();
-    let is = |point: usize, what: Status| status[point] == what as u8;
+/// Greatest change of the torque along `axis` between a point of `touching` and a neighbour that was measured (N m/rad or
+/// N/m).
+fn stiffest(dataset: &Dataset, touching: &[usize], axis: usize) -> f64 {
     let mut greatest = 0.0_f64;
-    for point in (0..grid.points()).filter(|&point| is(point, Status::Contact)) {
-        for beside in grid.beside(point, axis).into_iter().flatten().filter(|&beside| !is(beside, Status::Outside)) {
-            let change = torque[point * joints + axis] - torque[beside * joints + axis];
-            greatest = greatest.max(change.abs() / grid.axes[axis].step);
+    for &point in touching {
+        let beside = dataset.grid.beside(point, axis).into_iter().flatten();
+        for beside in beside.filter(|&beside| dataset.status(beside) != Status::Outside) {
+            let change = dataset.torque(point)[axis] - dataset.torque(beside)[axis];
+            greatest = greatest.max(change.abs() / dataset.grid.axes[axis].step);
         }
     }
     greatest
 }
 
 /// The differences between `point`, which touches, and its neighbours along `axis`: that behind, and free ones.
-fn beside(grid: &Grid, torque: &[f64], status: &[u8], point: usize, axis: usize) -> Vec<Difference> {
-    let joints = grid.joints();
-    let step = grid.axes[axis].step;
-    let mut found = Vec::new();
-    for (side, other) in grid.beside(point, axis).into_iter().enumerate() {
-        let Some(other) = other else { continue };
-        if status[other] == Status::Contact as u8 {
-            if side == 1 {
-                let mean = 0.5 * (torque[point * joints + axis] + torque[other * joints + axis]);
-                found.push(Difference { first: Some(point), second: other, value: -step * mean });
-            }
-        } else if status[other] != Status::Outside as u8 {
-            found.push(Difference {
-                first: None,
-                second: point,
-                value: onset(grid, torque, status, point, axis, 1 - side),
-            });
-        }
-    }
-    found
+fn beside(dataset: &Dataset, point: usize, axis: usize) -> impl Iterator<Item = Difference> {
+    let step = dataset.grid.axes[axis].step;
+    let beside = dataset.grid.beside(point, axis).into_iter().enumerate();
+    beside.filter_map(move |(side, other)| match (other?, dataset.status(other?)) {
+        (other, Status::Contact) => (side == 1).then(|| {
+            let mean = 0.5 * (dataset.torque(point)[axis] + dataset.torque(other)[axis]);
+            Difference { first: Some(point), second: other, value: -step * mean }
+        }),
+        (_, Status::Outside) => None,
+        _ => Some(Difference { first: None, second: point, value: onset(dataset, point, axis, 1 - side) }),
+    })
 }
 
 /// U at `point`, whose torque grows along `axis` towards `side` and begins within a step on the other side (J).
-fn onset(grid: &Grid, torque: &[f64], status: &[u8], point: usize, axis: usize, side: usize) -> f64 {
-    let (joints, step) = (grid.joints(), grid.axes[axis].step);
-    let of = |point: usize| torque[point * joints + axis].abs();
+fn onset(dataset: &Dataset, point: usize, axis: usize, side: usize) -> f64 {
+    let step = dataset.grid.axes[axis].step;
+    let of = |point: usize| dataset.torque(point)[axis].abs();
     let trapezoid = 0.5 * step * of(point);
-    let behind = grid.beside(point, axis)[side].filter(|&behind| status[behind] == Status::Contact as u8);
+    let behind = dataset.grid.beside(point, axis)[side].filter(|&behind| dataset.status(behind) == Status::Contact);
     match behind.map(|behind| (of(behind) - of(point)) / step) {
         Some(stiffness) if stiffness > 0.0 => (0.5 * of(point) * of(point) / stiffness).min(trapezoid),
         _ => trapezoid,
     }
-}
-
-fn norm(torque: &[f64], joints: usize, point: usize) -> f64 {
-    torque[point * joints..(point + 1) * joints].iter().map(|tau| tau * tau).sum::<f64>().sqrt()
 }
 
 /// Least squares of the differences; zero at points in none.
@@ -186,7 +169,7 @@ fn solve(points: usize, differences: &[Difference]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Axis;
+    use crate::dataset::{Axis, Grid};
 
     /// Two walls of 10 N m/rad, one of which was measured from 0.1 rad behind its surface on.
     #[test]
@@ -204,7 +187,7 @@ mod tests {
         } as u8;
         let status: Vec<u8> = depths.iter().enumerate().map(of).collect();
         let torque: Vec<f64> = torque.iter().zip(&status).map(|(tau, s)| if *s == 1 { *tau } else { 0.0 }).collect();
-        let energy = energy(&grid, &torque, &status);
+        let energy = energy(&Dataset::bare(grid, torque, status.clone()));
         for point in (0..21).filter(|&point| status[point] == Status::Contact as u8) {
             // What nobody measured before the first point behind the hole is at most what it would be at this stiffness.
             assert!((energy[point] - 5.0 * depths[point].powi(2)).abs() < 1e-6, "{point}: {}", energy[point]);
@@ -225,7 +208,7 @@ mod tests {
             status.push(if depth > 0.0 { Status::Contact } else { Status::Free } as u8);
             expected.push(5.0 * depth * depth);
         }
-        let energy = energy(&grid, &torque, &status);
+        let energy = energy(&Dataset::bare(grid, torque, status));
         let greatest = expected.iter().copied().fold(0.0, f64::max);
         for (found, expected) in energy.iter().zip(&expected) {
             assert!((found - expected).abs() < 0.01 * greatest, "{found} {expected}");

@@ -137,16 +137,10 @@ impl Reversals<'_> {
                     .extend((0..=k).map(|l| if size > 0.0 { (half[k] * half[l] / (size * size)) as f32 } else { 0.0 }));
             }
             if status[point] != Status::Outside as u8 {
-                let felt = [-1.0, 1.0].map(|side| {
-                    centre
-                        .iter()
-                        .zip(half.iter())
-                        .map(|(centre, half)| (centre + side * half).powi(2))
-                        .sum::<f64>()
-                        .sqrt()
-                });
-                status[point] =
-                    if felt[0].max(felt[1]) > report.epsilon { Status::Contact } else { Status::Free } as u8;
+                let both = || centre.iter().zip(half.iter());
+                let felt = |side: f64| both().map(|(centre, half)| (centre + side * half).powi(2)).sum::<f64>().sqrt();
+                let touches = felt(-1.0).max(felt(1.0)) > report.epsilon;
+                status[point] = if touches { Status::Contact } else { Status::Free } as u8;
             }
         }
         report.contact_points = status.iter().filter(|status| **status == Status::Contact as u8).count();
@@ -194,8 +188,7 @@ impl Reversals<'_> {
         takes: impl Fn(usize) -> bool,
     ) -> Result<Option<Vec<[f64; 2]>>, Error> {
         let joints = dataset.grid.joints();
-        let mut slopes = JointVector::zeros(joints);
-        slopes.fill(NO_LAYER);
+        let slopes = std::iter::repeat_n(NO_LAYER, joints).collect();
         let field = TorqueField::interpolated(dataset, Interpolation::Linear, THRESHOLD, &slopes)?;
         let (mut count, mut squares) = (0.0, vec![[0.0; 2]; joints]);
         for (history, strokes) in self.histories.iter().zip(self.strokes()) {
@@ -203,9 +196,7 @@ impl Reversals<'_> {
             let mut before: Option<JointVector> = None;
             for (row, stroke) in strokes.into_iter().enumerate() {
                 let [q, measured] = history.row(row, joints);
-                let mut way = q;
-                way.iter_mut().zip(before.unwrap_or(q).iter()).for_each(|(way, before)| *way -= before);
-                before = Some(q);
+                let way = q.iter().zip(before.replace(q).unwrap_or(q).iter()).map(|(q, before)| q - before).collect();
                 let sample = field.sample(&q);
                 let slip = field.slip(&q, &sample);
                 deflection = slip.deflected(&deflection, &way).shortened(slip.normal_force / stiffness);
@@ -255,7 +246,7 @@ mod tests {
             let direction = if speed > 0.0 { LeadDirection::Forward } else { LeadDirection::Backward };
             let torque = [(3.0 * q).sin() / 3.0 - force * h / size, 0.2 * q - force * other / size];
             let torque = torque.map(|tau| tau + 2e-3 * noise.normal());
-            history.push(time, &[q, 0.7 - gear * q], &torque, (speed.abs() > 0.05).then_some(direction));
+            history.push(time, &[q, 0.7 - gear * q], &torque, (true, (speed.abs() > 0.05).then_some(direction)));
         }
         history
     }

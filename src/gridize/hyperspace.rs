@@ -17,7 +17,7 @@
 
 use super::{
     barycentric::barycentric,
-    cloud::{Cloud, Position, dot},
+    cloud::{Cloud, Position, distance_squared, dot},
     interpolant::{Simplex, Triangulation},
 };
 use crate::MAX_AXES;
@@ -195,10 +195,6 @@ impl Hyperspace {
 impl Triangulation for Hyperspace {
     type Walk = HyperWalk;
 
-    fn walk(&self) -> HyperWalk {
-        HyperWalk::default()
-    }
-
     fn simplex(&self, walk: &mut HyperWalk, at: &Position) -> Option<Simplex> {
         if walk.cells.len() > HYPER_CELLS {
             *walk = HyperWalk::default();
@@ -213,10 +209,6 @@ impl Triangulation for Hyperspace {
     fn position(&self, vertex: u32) -> &Position {
         &self.points[vertex as usize]
     }
-}
-
-fn distance_squared(a: &Position, b: &Position) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum()
 }
 
 /// Unit vector and length of the part of `point - origin` off the span of the orthonormal `basis`.

@@ -6,30 +6,13 @@ use super::{
 };
 use crate::MAX_AXES;
 
-/// Interpolation of scattered values, asked point after point along a path.
-pub(super) trait Interpolant: Sync {
-    /// State of one worker between points.
-    type Walk<'a>
-    where
-        Self: 'a;
-
-    /// A walk that knows nothing yet.
-    fn walk(&self) -> Self::Walk<'_>;
-
-    /// Points and weights at `at`; none outside the convex hull.
-    fn weights(&self, walk: &mut Self::Walk<'_>, at: &Position, weights: &mut Vec<(u32, f64)>);
-}
-
 /// Vertices of a simplex; the first d + 1 entries count.
 pub(super) type Simplex = [u32; MAX_AXES + 1];
 
 /// A Delaunay triangulation that can be asked where a position lies.
 pub(super) trait Triangulation: Sync {
-    /// State of one worker between points.
-    type Walk;
-
-    /// A walk that knows nothing yet.
-    fn walk(&self) -> Self::Walk;
+    /// State of one worker between points; by default one that knows nothing yet.
+    type Walk: Default;
 
     /// The simplex that holds `at`; `None` outside the convex hull.
     fn simplex(&self, walk: &mut Self::Walk, at: &Position) -> Option<Simplex>;
@@ -50,6 +33,18 @@ pub(super) struct Linear<'a, T> {
 }
 
 impl<T: Triangulation> Linear<'_, T> {
+    /// Returns what one worker asks, point after point along a path, for points and weights at a position; none outside
+    /// the convex hull.
+    pub fn walk(&self) -> impl FnMut(&Position, &mut Vec<(u32, f64)>) {
+        let mut walk = T::Walk::default();
+        move |at, weights| {
+            weights.clear();
+            if let Some((simplex, values)) = self.look_up(&mut walk, at) {
+                weights.extend(simplex.into_iter().zip(values).take(self.cloud.joints + 1));
+            }
+        }
+    }
+
     fn look_up(&self, walk: &mut T::Walk, at: &Position) -> Option<(Simplex, Weights)> {
         let first = self.simplex(walk, at, at);
         match first {
@@ -78,22 +73,4 @@ impl<T: Triangulation> Linear<'_, T> {
 /// `at`, pulled towards `centre` by the fraction `pull` of the way.
 pub(super) fn pulled_in(at: &Position, centre: &Position, pull: f64) -> Position {
     std::array::from_fn(|axis| at[axis] + pull * (centre[axis] - at[axis]))
-}
-
-impl<T: Triangulation> Interpolant for Linear<'_, T> {
-    type Walk<'a>
-        = T::Walk
-    where
-        Self: 'a;
-
-    fn walk(&self) -> T::Walk {
-        self.triangulation.walk()
-    }
-
-    fn weights(&self, walk: &mut T::Walk, at: &Position, weights: &mut Vec<(u32, f64)>) {
-        weights.clear();
-        if let Some((simplex, values)) = self.look_up(walk, at) {
-            weights.extend(simplex.into_iter().zip(values).take(self.cloud.joints + 1));
-        }
-    }
 }

@@ -23,8 +23,6 @@ impl<'a> Line<'a> {
 impl Triangulation for Line<'_> {
     type Walk = ();
 
-    fn walk(&self) {}
-
     fn simplex(&self, (): &mut (), at: &Position) -> Option<Simplex> {
         let below = self.order.partition_point(|&point| self.cloud.positions[point as usize][0] <= at[0]);
         let last = self.order.len() - 1;

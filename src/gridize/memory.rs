@@ -48,22 +48,22 @@ pub struct ForceHistory {
     pub torques: Vec<f64>,
     /// Whether each row counts: held by a device whose own inertia and friction are not in it.
     pub counts: Vec<bool>,
-    /// Where the lead joint goes in each row, where it moves; empty where none leads.
+    /// Where the lead joint goes in each row, where there is one and it moves.
     pub directions: Vec<Option<LeadDirection>>,
 }
 
 impl ForceHistory {
-    /// Adds a row that counts.
-    pub fn push(&mut self, time: f64, q: &[f64], torque: &[f64], direction: Option<LeadDirection>) {
+    /// Adds a row: whether it counts, and where the lead joint goes.
+    pub fn push(&mut self, time: f64, q: &[f64], torque: &[f64], (counts, way): (bool, Option<LeadDirection>)) {
         self.times.push(time);
         self.configurations.extend_from_slice(q);
         self.torques.extend_from_slice(torque);
-        self.counts.push(true);
-        self.directions.push(direction);
+        self.counts.push(counts);
+        self.directions.push(way);
     }
 
     /// Configuration and torque of row `row`, of `joints` numbers each.
-    pub(super) fn row(&self, row: usize, joints: usize) -> [JointVector; 2] {
+    pub(crate) fn row(&self, row: usize, joints: usize) -> [JointVector; 2] {
         [&self.configurations, &self.torques].map(|all| JointVector::from_slice(&all[row * joints..(row + 1) * joints]))
     }
 }
@@ -139,18 +139,16 @@ fn scale(dataset: &mut Dataset, scale: f64) {
 /// The histories as the potential of `dataset` has them.
 fn stretches(dataset: &Dataset, histories: &[ForceHistory]) -> Result<Vec<Stretch>, Error> {
     let joints = dataset.grid.joints();
-    let mut slopes = JointVector::zeros(joints);
-    slopes.fill(1.0);
+    let slopes = std::iter::repeat_n(1.0, joints).collect();
     let field = TorqueField::interpolated(dataset, Interpolation::Potential, THRESHOLD, &slopes);
     let field = field.map_err(|error| error.within("the gridized torque cannot be interpolated"))?;
     let of = |history: &ForceHistory| {
         let mut stretch =
             Stretch { times: history.times.clone(), counts: history.counts.clone(), ..Stretch::default() };
         let mut inside = Vec::new();
-        for (q, torque) in history.configurations.chunks_exact(joints).zip(history.torques.chunks_exact(joints)) {
-            let sample = field.sample(q);
-            let size = sample.torque.norm();
-            let along: f64 = sample.torque.iter().zip(torque).map(|(elastic, measured)| elastic * measured).sum();
+        for [q, torque] in (0..history.times.len()).map(|row| history.row(row, joints)) {
+            let sample = field.sample(&q);
+            let (size, along) = (sample.torque.norm(), sample.torque.dot(&torque));
             stretch.roots.push((2.0 * sample.energy.max(0.0)).sqrt());
             stretch.elastic.push(size);
             stretch.measured.push(if size > 0.0 { along / size } else { 0.0 });
@@ -234,10 +232,8 @@ mod tests {
                 }
                 let separation = TERMS[0][0] * z[0] + TERMS[1][0] * z[1];
                 if tick % 20 == 0 && w > 0.0 {
-                    history.times.push(time);
-                    history.configurations.push(q);
-                    history.torques.push(-2.0 * ((2.0 * q).exp() - 1.0) * (1.0 - separation / w).max(0.0));
-                    history.counts.push(true);
+                    let torque = -2.0 * ((2.0 * q).exp() - 1.0) * (1.0 - separation / w).max(0.0);
+                    history.push(time, &[q], &[torque], (true, None));
                 }
             }
         }

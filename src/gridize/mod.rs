@@ -26,7 +26,6 @@ pub mod prediction;
 mod relaxation;
 mod samples;
 mod smooth;
-mod space;
 mod tetrahedra;
 
 pub use cells::{Branches, CellReport, Cells, LeadDirection};
@@ -44,9 +43,13 @@ use crate::{
     names::counted,
     scene::GRID_LINE,
 };
-use cloud::{Cloud, JITTER, distance};
-use interpolant::{Interpolant, Linear};
+use cloud::{Cloud, JITTER, Position, distance_squared};
+use hyperspace::Hyperspace;
+use interpolant::{Linear, Triangulation};
+use line::Line;
+use plane::Plane;
 use rayon::prelude::*;
+use tetrahedra::Tetrahedra;
 
 /// Fraction by which a position just outside the hull is pulled towards its centre: 100 times the jitter, so that a
 /// grid point on a hull facet is found as long as the hull is thicker than about 1/50 of its extent there.
@@ -151,22 +154,24 @@ pub fn gridize(samples: &Samples, options: &GridizeOptions) -> Result<(Dataset, 
         smooth::smooth(&mut cloud)?;
     }
     let grid = grid(samples, &options.steps)?;
-    let linear = |pull| (pull, &cloud);
     let spacing = cloud.spacing();
     // Cells of the grid in which a sample lies stay whole, however coarse they are.
     let diagonal = cloud.length(&grid.axes.iter().map(|axis| axis.step).collect::<Vec<_>>());
     let reach = diagonal.max(options.within * spacing);
     let (mut torque, distances) = match (options.interpolation, cloud.joints) {
-        (Interpolation::Natural, 2) => fill(&plane::NaturalNeighbours::new(&cloud)?, &cloud, &grid),
+        (Interpolation::Natural, 2) => {
+            let plane = Plane::new(&cloud)?;
+            fill(|| plane.natural_neighbours(), &cloud, &grid)
+        }
         (Interpolation::Natural, joints) => {
             return Err(error!(
                 "natural neighbour interpolation takes 2 joints, the samples have {joints}: use linear interpolation"
             ));
         }
-        (Interpolation::Linear, 1) => fill_linear(line::Line::new(&cloud), linear(HULL_PULL), &grid),
-        (Interpolation::Linear, 2) => fill_linear(plane::Plane::new(&cloud)?, linear(HULL_PULL), &grid),
-        (Interpolation::Linear, 3) => fill_linear(space::Space::new(&cloud)?, linear(HULL_PULL), &grid),
-        _ => fill_linear(hyperspace::Hyperspace::new(&cloud), linear(HYPER_PULL), &grid),
+        (Interpolation::Linear, 1) => fill_linear(Line::new(&cloud), HULL_PULL, &cloud, &grid),
+        (Interpolation::Linear, 2) => fill_linear(Plane::new(&cloud)?, HULL_PULL, &cloud, &grid),
+        (Interpolation::Linear, 3) => fill_linear(Tetrahedra::new(&cloud)?, HULL_PULL, &cloud, &grid),
+        _ => fill_linear(Hyperspace::new(&cloud), HYPER_PULL, &cloud, &grid),
     };
     let is_inside = |distance: f64| distance.is_finite();
     let is_known = |distance: f64| is_inside(distance) && distance <= reach;
@@ -243,8 +248,7 @@ fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, Error> {
             let joint = &label.name;
             return Err(error!("grid step {step} of joint `{joint}` is not a positive number"));
         }
-        let column = || samples.configurations.iter().skip(joint).step_by(joints).copied();
-        let [low, high] = [column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max)];
+        let [low, high] = samples.range(joint);
         // Of a step beyond all reason the slack must not reach across the samples.
         let slack = GRID_LINE * ((high - low) / step).min(1.0);
         let first = (low / step - slack).ceil();
@@ -273,30 +277,32 @@ fn grid(samples: &Samples, steps: &[f64]) -> Result<Grid, Error> {
     Ok(Grid { axes })
 }
 
-fn fill_linear<T: interpolant::Triangulation>(
-    triangulation: T,
-    (pull, cloud): (f64, &Cloud),
-    grid: &Grid,
-) -> (Vec<f64>, Vec<f64>) {
-    fill(&Linear { triangulation, cloud, pull }, cloud, grid)
+fn fill_linear<T: Triangulation>(triangulation: T, pull: f64, cloud: &Cloud, grid: &Grid) -> (Vec<f64>, Vec<f64>) {
+    let linear = Linear { triangulation, cloud, pull };
+    fill(|| linear.walk(), cloud, grid)
 }
 
-/// Torque of every grid point, and the distance to the nearest of the samples that make it, infinite outside the hull. Blocks of fixed size, each with a walk of its own: the same numbers
-/// whatever the number of threads.
-fn fill<I: Interpolant>(interpolant: &I, cloud: &Cloud, grid: &Grid) -> (Vec<f64>, Vec<f64>) {
+/// Torque of every grid point, and the distance to the nearest of the samples that make it, infinite outside the hull.
+/// Blocks of fixed size, each with a walk of its own that `begin` makes ([`Linear::walk`]): the same numbers whatever the
+/// number of threads.
+fn fill<W: FnMut(&Position, &mut Vec<(u32, f64)>)>(
+    begin: impl Fn() -> W + Sync,
+    cloud: &Cloud,
+    grid: &Grid,
+) -> (Vec<f64>, Vec<f64>) {
     const BLOCK: usize = 8192;
     let joints = cloud.joints;
     let mut torque = vec![0.0; grid.points() * joints];
     let mut distances = vec![f64::INFINITY; grid.points()];
     let blocks = torque.par_chunks_mut(BLOCK * joints).zip(distances.par_chunks_mut(BLOCK)).enumerate();
     blocks.for_each(|(block, (torque, distances))| {
-        let mut walk = interpolant.walk();
+        let mut walk = begin();
         let mut weights = Vec::with_capacity(MAX_AXES + 1);
         for (offset, (torque, nearest)) in torque.chunks_exact_mut(joints).zip(distances).enumerate() {
             let at = cloud.scaled(&grid.configuration(block * BLOCK + offset));
-            interpolant.weights(&mut walk, &at, &mut weights);
+            walk(&at, &mut weights);
             for &(point, weight) in &weights {
-                *nearest = nearest.min(distance(&at, &cloud.positions[point as usize]));
+                *nearest = nearest.min(distance_squared(&at, &cloud.positions[point as usize]).sqrt());
                 for (sum, value) in torque.iter_mut().zip(cloud.torque(point)) {
                     *sum += weight * value;
                 }

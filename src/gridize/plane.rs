@@ -3,16 +3,12 @@
 
 use super::{
     HULL_PULL,
-    cloud::{JITTER, MERGE_DISTANCE},
-};
-use super::{
-    cloud::{Cloud, Position},
-    interpolant::{Interpolant, Simplex, Triangulation, pulled_in},
+    cloud::{Cloud, JITTER, MERGE_DISTANCE, Position},
+    interpolant::{Simplex, Triangulation, pulled_in},
 };
 use crate::{Error, MAX_AXES, error};
 use spade::{
-    DelaunayTriangulation, HasPosition, HierarchyHintGenerator, NaturalNeighbor, Point2, PositionInTriangulation,
-    Triangulation as _, handles::FixedVertexHandle,
+    DelaunayTriangulation, HasPosition, HierarchyHintGenerator, Point2, PositionInTriangulation, Triangulation as _,
 };
 
 type Mesh = DelaunayTriangulation<Vertex, (), (), (), HierarchyHintGenerator<f64>>;
@@ -35,11 +31,6 @@ fn planar(at: &Position) -> Point2<f64> {
     Point2::new(clear(at[0]), clear(at[1]))
 }
 
-fn triangulate(cloud: &Cloud) -> Result<Mesh, Error> {
-    let vertices = cloud.positions.iter().zip(0..).map(|(at, point)| Vertex { position: planar(at), point }).collect();
-    Mesh::bulk_load(vertices).map_err(|error| error!("the samples cannot be triangulated: {error}"))
-}
-
 /// Triangles in the plane.
 pub(super) struct Plane<'a> {
     cloud: &'a Cloud,
@@ -48,14 +39,29 @@ pub(super) struct Plane<'a> {
 
 impl<'a> Plane<'a> {
     pub fn new(cloud: &'a Cloud) -> Result<Self, Error> {
-        Ok(Self { cloud, mesh: triangulate(cloud)? })
+        let vertex = |(at, point): (&Position, u32)| Vertex { position: planar(at), point };
+        let mesh = Mesh::bulk_load(cloud.positions.iter().zip(0..).map(vertex).collect())
+            .map_err(|error| error!("the samples cannot be triangulated: {error}"))?;
+        Ok(Self { cloud, mesh })
+    }
+
+    /// As [`Linear::walk`](super::interpolant::Linear::walk), by natural neighbours (Sibson 1981): smooth except at the
+    /// samples.
+    pub fn natural_neighbours(&self) -> impl FnMut(&Position, &mut Vec<(u32, f64)>) {
+        let (neighbours, mut found) = (self.mesh.natural_neighbor(), Vec::new());
+        move |at, weights| {
+            neighbours.get_weights(planar(at), &mut found);
+            if found.is_empty() {
+                neighbours.get_weights(planar(&pulled_in(at, &self.cloud.centre, HULL_PULL)), &mut found);
+            }
+            weights.clear();
+            weights.extend(found.iter().map(|&(vertex, weight)| (self.mesh.vertex(vertex).data().point, weight)));
+        }
     }
 }
 
 impl Triangulation for Plane<'_> {
     type Walk = ();
-
-    fn walk(&self) {}
 
     fn simplex(&self, (): &mut (), at: &Position) -> Option<Simplex> {
         let mesh = &self.mesh;
@@ -79,43 +85,5 @@ impl Triangulation for Plane<'_> {
 
     fn position(&self, vertex: u32) -> &Position {
         &self.cloud.positions[vertex as usize]
-    }
-}
-
-/// Natural neighbour interpolation (Sibson 1981): smooth except at the samples.
-pub(super) struct NaturalNeighbours<'a> {
-    cloud: &'a Cloud,
-    mesh: Mesh,
-}
-
-/// Spade's own buffers, which no two threads may share, and its answer.
-pub(super) struct NeighbourWalk<'a> {
-    neighbours: NaturalNeighbor<'a, Mesh>,
-    found: Vec<(FixedVertexHandle, f64)>,
-}
-
-impl<'a> NaturalNeighbours<'a> {
-    pub fn new(cloud: &'a Cloud) -> Result<Self, Error> {
-        Ok(Self { cloud, mesh: triangulate(cloud)? })
-    }
-}
-
-impl Interpolant for NaturalNeighbours<'_> {
-    type Walk<'w>
-        = NeighbourWalk<'w>
-    where
-        Self: 'w;
-
-    fn walk(&self) -> NeighbourWalk<'_> {
-        NeighbourWalk { neighbours: self.mesh.natural_neighbor(), found: Vec::new() }
-    }
-
-    fn weights(&self, walk: &mut NeighbourWalk<'_>, at: &Position, weights: &mut Vec<(u32, f64)>) {
-        walk.neighbours.get_weights(planar(at), &mut walk.found);
-        if walk.found.is_empty() {
-            walk.neighbours.get_weights(planar(&pulled_in(at, &self.cloud.centre, HULL_PULL)), &mut walk.found);
-        }
-        weights.clear();
-        weights.extend(walk.found.iter().map(|&(vertex, weight)| (self.mesh.vertex(vertex).data().point, weight)));
     }
 }

@@ -34,6 +34,12 @@ impl Samples {
         self.configurations.is_empty()
     }
 
+    /// Least and greatest coordinate of a joint (rad or m).
+    pub(super) fn range(&self, joint: usize) -> [f64; 2] {
+        let column = || self.configurations.iter().skip(joint).step_by(self.joints.len()).copied();
+        [column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max)]
+    }
+
     /// Whether the torques draw the arm on where those of an object push it back.
     #[must_use]
     pub fn draw_on(&self) -> bool {

@@ -9,7 +9,7 @@
 //! torques too, and edges keep their height.
 
 use super::{
-    cloud::{Cloud, Position},
+    cloud::{Cloud, Position, distance_squared},
     normal,
 };
 use crate::{Error, MAX_AXES};
@@ -60,8 +60,7 @@ impl Cells {
                 rest /= 3;
             }
             for &other in self.points.get(&cell).into_iter().flatten().filter(|&&other| other as usize != point) {
-                let pairs = positions[other as usize].iter().zip(&positions[point]);
-                found.push((pairs.map(|(a, b)| (a - b) * (a - b)).sum(), other));
+                found.push((distance_squared(&positions[other as usize], &positions[point]), other));
             }
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

@@ -147,9 +147,8 @@ fn the_search_without_a_triangulation_agrees_with_the_tetrahedra() {
     let given = samples(&points, |q| (5.0 * q[0]).sin() + q[1] * q[2]);
     let cloud = Cloud::new(&given).unwrap();
     let grid = grid(&given, &[0.05]).unwrap();
-    let (pull, cloud) = (HULL_PULL, &cloud);
-    let (a, a_near) = fill_linear(space::Space::new(cloud).unwrap(), (pull, cloud), &grid);
-    let (b, b_near) = fill_linear(hyperspace::Hyperspace::new(cloud), (pull, cloud), &grid);
+    let (a, a_near) = fill_linear(Tetrahedra::new(&cloud).unwrap(), HULL_PULL, &cloud, &grid);
+    let (b, b_near) = fill_linear(Hyperspace::new(&cloud), HULL_PULL, &cloud, &grid);
     assert!(a_near.iter().zip(&b_near).all(|(a, b)| a == b));
     assert!(a_near.iter().filter(|nearest| nearest.is_finite()).count() > 2000);
     let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -6,8 +6,12 @@
 //! holds it; its boundary facets, joined with the point, fill it again. Predicates decide by their exact sign
 //! (`robust`), so the cavity is star-shaped and no tetrahedron is ever inverted.
 
-use super::{cloud::Position, order::insertion_order};
-use crate::{Error, error};
+use super::{
+    cloud::{Cloud, JITTER, Position},
+    interpolant::{Simplex, Triangulation},
+    order::insertion_order,
+};
+use crate::{Error, MAX_AXES, error};
 use robust::{Coord3D, insphere, orient3d};
 
 /// Simplices that may be created per point before an arrangement is called degenerate. Random points create about 27
@@ -24,7 +28,7 @@ const NONE: u32 = u32::MAX;
 
 /// A tetrahedralisation with adjacency.
 pub(super) struct Tetrahedra {
-    pub points: Vec<Position>,
+    points: Vec<Position>,
     vertices: Vec<[u32; 4]>,
     /// Entry i: the tetrahedron across the facet opposite vertex i.
     neighbours: Vec<[u32; 4]>,
@@ -33,6 +37,7 @@ pub(super) struct Tetrahedra {
 }
 
 /// Scratch memory of the insertion, reused from point to point.
+#[derive(Default)]
 struct Work {
     /// Stamp of the last point that tested a tetrahedron, twice, plus one when it lay in the cavity.
     marks: Vec<u64>,
@@ -46,9 +51,10 @@ struct Work {
 }
 
 impl Tetrahedra {
-    /// Tetrahedralises `points`; `spanning` are four of them that span a volume.
-    pub fn new(points: Vec<Position>, spanning: &[u32]) -> Result<Self, Error> {
-        let mut first = [spanning[0], spanning[1], spanning[2], spanning[3]];
+    /// Tetrahedralises the jittered points of `cloud`.
+    pub fn new(cloud: &Cloud) -> Result<Self, Error> {
+        let mut first: [u32; 4] = std::array::from_fn(|k| cloud.spanning[k]);
+        let points = cloud.jittered(JITTER);
         let order = insertion_order(&points);
         let mut mesh = Self { points, vertices: Vec::new(), neighbours: Vec::new(), last: 0 };
         if mesh.orientation(&first) < 0.0 {
@@ -56,15 +62,7 @@ impl Tetrahedra {
         }
         mesh.begin(first);
         let limit = SIMPLICES_PER_POINT * mesh.points.len() + FREE_SIMPLICES;
-        let mut work = Work {
-            marks: vec![0; mesh.vertices.len()],
-            stamp: 0,
-            cavity: Vec::new(),
-            boundary: Vec::new(),
-            free: Vec::new(),
-            open: Vec::new(),
-            created: 0,
-        };
+        let mut work = Work { marks: vec![0; mesh.vertices.len()], ..Work::default() };
         for point in order {
             if first.contains(&point) {
                 continue;
@@ -79,18 +77,6 @@ impl Tetrahedra {
             }
         }
         Ok(mesh)
-    }
-
-    /// Vertices of the tetrahedron that holds `at`, walking from `hint`; `None` outside the hull.
-    pub fn locate(&self, at: &Position, hint: &mut u32) -> Option<[u32; 4]> {
-        *hint = self.walk(at, if *hint == NONE { self.last } else { *hint });
-        let vertices = self.vertices[*hint as usize];
-        (!vertices.contains(&INFINITE)).then_some(vertices)
-    }
-
-    /// A hint that knows nothing yet.
-    pub const fn no_hint() -> u32 {
-        NONE
     }
 
     fn coordinate(&self, vertex: u32) -> Coord3D<f64> {
@@ -256,5 +242,23 @@ impl Tetrahedra {
         } else {
             open.push((edge, new, slot));
         }
+    }
+}
+
+impl Triangulation for Tetrahedra {
+    /// Where the last walk ended.
+    type Walk = Option<u32>;
+
+    fn simplex(&self, hint: &mut Option<u32>, at: &Position) -> Option<Simplex> {
+        let found = self.walk(at, hint.unwrap_or(self.last));
+        *hint = Some(found);
+        let vertices = self.vertices[found as usize];
+        let mut simplex = [0; MAX_AXES + 1];
+        simplex[..4].copy_from_slice(&vertices);
+        (!vertices.contains(&INFINITE)).then_some(simplex)
+    }
+
+    fn position(&self, vertex: u32) -> &Position {
+        &self.points[vertex as usize]
     }
 }

@@ -2,39 +2,13 @@
 
 use super::mapping::{ColumnName, Joint, Keep, Mapping};
 use crate::{MAX_AXES, names, scene::effort_unit};
-use std::ops::Range;
-use toml::{
-    Spanned,
-    de::{DeTable, DeValue},
-};
 
 /// A value that cannot be.
 pub(super) struct Refusal {
     /// Keys and, of arrays, numbers from 0, with points between: `joint.0.position.scale`.
-    key: String,
+    pub key: String,
     /// Problem, and the values that are allowed, in words.
     pub message: String,
-}
-
-impl Refusal {
-    /// The bytes of `text` in which the value stands; where the key is absent, those of the table that lacks it.
-    pub fn place(&self, text: &str) -> Range<usize> {
-        let Ok(document) = DeTable::parse(text) else { return 0..0 };
-        let mut keys = self.key.split('.');
-        let mut found = keys.next().and_then(|key| document.get_ref().get(key));
-        for key in keys {
-            let inner = match found.map(Spanned::get_ref) {
-                Some(DeValue::Table(table)) => table.get(key),
-                Some(DeValue::Array(array)) => key.parse().ok().and_then(|number: usize| array.get(number)),
-                _ => None,
-            };
-            if inner.is_none() {
-                break;
-            }
-            found = inner;
-        }
-        found.map_or(0..0, Spanned::span)
-    }
 }
 
 /// Refuses the value of `key` where it is `bad`.
@@ -60,7 +34,7 @@ impl Mapping {
         refuse(![',', '.'].contains(&table.decimal), "table.decimal", "table.decimal must be `.` or `,`")?;
         refuse(time.column.is_some() == time.period.is_some(), "time", "[time] needs either a column or a period")?;
         refuse(!is_positive(time.scale), "time.scale", "time.scale must be a positive number of seconds")?;
-        let other = time.unit.is_some_and(|unit| unit.in_si().1 != "s");
+        let other = time.unit.is_some_and(|unit| unit.si != "s");
         refuse(other, "time.unit", "time.unit must be one of time: s, ms or us")?;
         let period = time.period.unwrap_or(1.0);
         refuse(!is_positive(period), "time.period", "time.period must be a positive number of seconds")?;
@@ -107,7 +81,7 @@ fn check_joint(before: &[Joint], number: usize, joint: &Joint) -> Result<(), Ref
         let wanted = if what == "torque" { effort_unit(&joint.unit) } else { &joint.unit };
         let message =
             format!("{what} of joint `{name}`, which moves in {}: its column needs a unit of {wanted}", joint.unit);
-        let other = quantity.unit.is_some_and(|unit| unit.in_si().1 != wanted);
+        let other = quantity.unit.is_some_and(|unit| unit.si != wanted);
         refuse(other, format!("joint.{number}.{what}.unit"), message)?;
         let scaled = quantity.scale.is_finite() && quantity.scale != 0.0;
         let message = format!("{what} of joint `{name}`: scale must be a number other than zero");

@@ -246,10 +246,10 @@ impl Mapping {
         let mut mapping: Self =
             toml::from_str(text).map_err(|error| invalid(error.span().unwrap_or(0..0), error.message()))?;
         for joint in mapping.joints.iter_mut().filter(|joint| joint.unit.is_empty()) {
-            let own = joint.position.unit.map(|unit| unit.in_si().1).filter(|unit| ["rad", "m"].contains(unit));
+            let own = joint.position.unit.map(|unit| unit.si).filter(|unit| ["rad", "m"].contains(unit));
             joint.unit = own.unwrap_or(RADIANS).to_owned();
         }
-        mapping.check().map_err(|refusal| invalid(refusal.place(text), &refusal.message))?;
+        mapping.check().map_err(|refusal| invalid(scene::find_key(text, &refusal.key).0, &refusal.message))?;
         Ok(mapping)
     }
 

@@ -28,7 +28,7 @@ use crate::{
     names::counted,
     ros::{JointStateTable, is_mcap},
 };
-use rows::{ReadRowResult, Row, Rows};
+use rows::Rows;
 use std::{
     fmt,
     io::{BufRead, BufReader, Read},
@@ -169,7 +169,7 @@ fn remedy(reason: Reason, of_robot: bool, mapping: &Mapping) -> String {
         Reason::TimeGoesBack => "the clock was set meanwhile: cut off what comes before or behind that".into(),
         _ if of_robot => format!(
             "each message has to give position and effort of all joints, {}: choose those of one publisher by a column \
-             mapping (--columns)",
+             mapping (--columns) with `bad_rows = \"drop\"`",
             joints()
         ),
         _ => "correct the log or the mapping, or cut off the part that is not a measurement".into(),
@@ -243,18 +243,20 @@ impl<'a> Import<'a> {
         const ROWS_A_REPORT: u64 = 1 << 14;
         let mapping = self.mapping;
         let mut rows = Rows::new(mapping, reader, file);
-        loop {
-            let row = match rows.next()? {
-                ReadRowResult::End => break,
-                ReadRowResult::Row(row) => row,
-                ReadRowResult::Dropped(reason) => {
-                    self.report.rows += 1;
+        while let Some(row) = rows.next()? {
+            self.report.rows += 1;
+            match row {
+                Err(reason) => {
                     self.drop_row(reason, file, rows.lines.number);
                     continue;
                 }
-            };
-            self.report.rows += 1;
-            self.take(row, file)?;
+                Ok(row) => {
+                    if row.first {
+                        self.end_segment(file)?;
+                    }
+                    self.window.push(row).map_or(Ok(()), |seen| self.keep(&seen, file))?;
+                }
+            }
             if self.report.rows.is_multiple_of(ROWS_A_REPORT) {
                 progress(rows.lines.bytes, self.report.rows);
             }
@@ -269,16 +271,6 @@ impl<'a> Import<'a> {
         match self.report.dropped.iter_mut().find(|dropped| dropped.reason == reason) {
             Some(dropped) => dropped.rows += 1,
             None => self.report.dropped.push(Dropped { reason, rows: 1, first: format!("{file}:{line}") }),
-        }
-    }
-
-    fn take(&mut self, row: Row, file: &str) -> Result<(), Error> {
-        if row.first {
-            self.end_segment(file)?;
-        }
-        match self.window.push(row) {
-            Some(seen) => self.keep(&seen, file),
-            None => Ok(()),
         }
     }
 
@@ -323,7 +315,7 @@ impl<'a> Import<'a> {
             }
         }
         if let Some(history) = self.histories.last_mut().filter(|_| relaxes || friction) {
-            history.push(block.time, &block.q, &block.torque, (lead.abs() > still).then_some(direction));
+            history.push(block.time, &block.q, &block.torque, (true, (lead.abs() > still).then_some(direction)));
         }
         match keep {
             Keep::All => {

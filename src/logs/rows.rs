@@ -46,14 +46,8 @@ struct Layout {
     torques: Vec<usize>,
 }
 
-/// Result of reading a line.
-#[expect(clippy::large_enum_variant, reason = "one at a time; a box would be memory for every row")]
-pub(super) enum ReadRowResult {
-    Row(Row),
-    /// Left out, and why.
-    Dropped(Reason),
-    End,
-}
+/// A row, or why it was left out.
+type ReadRow = Result<Row, Reason>;
 
 impl<'a, R: BufRead> Rows<'a, R> {
     pub fn new(mapping: &'a Mapping, reader: R, file: &str) -> Self {
@@ -69,8 +63,8 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
     }
 
-    /// The next row, or why a line was left out.
-    pub fn next(&mut self) -> Result<ReadRowResult, Error> {
+    /// The next row, or why a line was left out; `None` at the end.
+    pub fn next(&mut self) -> Result<Option<ReadRow>, Error> {
         let mut line = std::mem::take(&mut self.text);
         while let Some(text) = self.lines.next(&mut line)? {
             let text = text.trim_ascii_end();
@@ -80,10 +74,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
             }
             if let Some(outcome) = self.line_outcome(text)? {
                 self.text = line;
-                return Ok(outcome);
+                return Ok(Some(outcome));
             }
         }
-        Ok(ReadRowResult::End)
+        Ok(None)
     }
 
     fn error(&self, message: String) -> Error {
@@ -91,7 +85,7 @@ impl<'a, R: BufRead> Rows<'a, R> {
     }
 
     /// Parses a line that is no comment; `None` for the header.
-    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRowResult>, Error> {
+    fn line_outcome(&mut self, text: &[u8]) -> Result<Option<ReadRow>, Error> {
         let delimiter = self.mapping.table.delimiter;
         let Ok(text) = std::str::from_utf8(text) else {
             if self.layout.is_none() {
@@ -143,22 +137,21 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
         let skip = usize::from(layout.time.is_some());
         let stamp = layout.time.map(|_| found[0] * in_si(self.mapping.time.unit) * self.mapping.time.scale);
-        let (mut q, mut torque) = (JointVector::zeros(joints), JointVector::zeros(joints));
-        for (joint, spec) in self.mapping.joints.iter().enumerate() {
-            q[joint] = converted(&spec.position, found[skip + joint]);
-            torque[joint] = self.mapping.torque.effort.sign() * converted(&spec.torque, found[skip + joints + joint]);
-        }
+        let (specs, sign) = (|| self.mapping.joints.iter(), self.mapping.torque.effort.sign());
+        let q = specs().zip(&found[skip..]).map(|(spec, raw)| converted(&spec.position, *raw)).collect();
+        let torque = specs().zip(&found[skip + joints..]).map(|(spec, raw)| sign * converted(&spec.torque, *raw));
+        let torque = torque.collect();
         self.timed(stamp, q, torque).map(Some)
     }
 
     /// Places a row in time: repeated stamps are left out, going back is refused, a long pause begins a segment.
-    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<ReadRowResult, Error> {
+    fn timed(&mut self, stamp: Option<f64>, q: JointVector, torque: JointVector) -> Result<ReadRow, Error> {
         let period = self.mapping.time.period.unwrap_or(0.0);
         let time = stamp.unwrap_or(self.count as f64 * period);
         let mut first = self.last_time.is_none();
         if let Some(last) = self.last_time {
             if time == last {
-                return Ok(ReadRowResult::Dropped(Reason::RepeatedTime));
+                return Ok(Err(Reason::RepeatedTime));
             }
             if time < last {
                 return self.refuse(Reason::TimeGoesBack, format!("time goes back from {last} s to {time} s"));
@@ -168,12 +161,12 @@ impl<'a, R: BufRead> Rows<'a, R> {
         }
         self.last_time = Some(time);
         self.count += 1;
-        Ok(ReadRowResult::Row(Row { first, line: self.lines.number, time, q, torque }))
+        Ok(Ok(Row { first, line: self.lines.number, time, q, torque }))
     }
 
-    fn refuse(&self, reason: Reason, message: String) -> Result<ReadRowResult, Error> {
+    fn refuse(&self, reason: Reason, message: String) -> Result<ReadRow, Error> {
         match self.mapping.table.bad_rows {
-            BadRows::Drop => Ok(ReadRowResult::Dropped(reason)),
+            BadRows::Drop => Ok(Err(reason)),
             BadRows::Refuse => Err(self.error(format!("{message}; `bad_rows = \"drop\"` would leave the row out"))),
         }
     }
@@ -182,6 +175,9 @@ impl<'a, R: BufRead> Rows<'a, R> {
         if self.mapping.table.delimiter != ';' && field.contains(';') {
             return " (columns seem to be separated by semicolons: set `delimiter = \";\"`, and `decimal = \",\"` where \
                     decimals are commas)";
+        }
+        if self.mapping.table.delimiter != '\t' && field.contains('\t') {
+            return " (columns seem to be separated by tabs: set `delimiter = \"\\t\"`)";
         }
         let comma_number = self.mapping.table.decimal == '.' && number(field, ',').is_some();
         if comma_number { " (decimals seem to be commas: set `decimal = \",\"`)" } else { "" }
@@ -204,7 +200,10 @@ impl<'a, R: BufRead> Rows<'a, R> {
                 match (found.next(), found.next()) {
                     (Some(column), None) => Ok(column),
                     (None, _) => {
-                        Err(self.error(format!("no column is called `{}`; there are {}", escaped(name), listed(names))))
+                        let hint = names.first().map_or("", |field| self.hint(field));
+                        let what =
+                            format!("no column is called `{}`; there are {}{hint}", escaped(name), listed(names));
+                        Err(self.error(what))
                     }
                     (Some(first), Some(second)) => Err(self.error(format!(
                         "columns {} and {} are both called `{name}`: give the number of the one that is meant",
@@ -232,7 +231,7 @@ fn converted(quantity: &Quantity, raw: f64) -> f64 {
 
 /// SI units that one of `unit` is (1).
 fn in_si(unit: Option<ColumnUnit>) -> f64 {
-    unit.map_or(1.0, |unit| unit.in_si().0)
+    unit.map_or(1.0, |unit| unit.factor)
 }
 
 /// The first of `names`, as many as a message has room for.

@@ -35,6 +35,10 @@ fn a_time_that_hardly_ever_goes_on_is_refused() {
         .replace("[time]", "[table]\nheader = true\n[time]");
     let why = refused(&forged, "t,q,tau\n1,2,3\n");
     assert!(why.contains("no column is called `a\\u000ab: all is well`") && !why.contains('\n'), "{why}");
+    for (separator, named) in [(";", "semicolons"), ("\t", "tabs"), ("|", "there are t|q|tau")] {
+        let why = refused(&forged, &"t,q,tau\n1,2,3\n".replace(',', separator));
+        assert!(why.contains(named) && (separator == "|" || why.contains("set `delimiter = ")), "{why}");
+    }
 }
 
 #[test]

@@ -1,89 +1,61 @@
 //! Units of a log's columns, and what they are in SI.
 
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer, de::Error};
 
 /// Unit of a column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum ColumnUnit {
-    /// Radian.
-    #[serde(rename = "rad")]
-    Radian,
-    /// Degree.
-    #[serde(rename = "deg")]
-    Degree,
-    /// Metre.
-    #[serde(rename = "m")]
-    Metre,
-    /// Centimetre.
-    #[serde(rename = "cm")]
-    Centimetre,
-    /// Millimetre.
-    #[serde(rename = "mm")]
-    Millimetre,
-    /// Newton metre.
-    #[serde(rename = "N m")]
-    NewtonMetre,
-    /// Newton centimetre.
-    #[serde(rename = "N cm")]
-    NewtonCentimetre,
-    /// Newton millimetre, a thousandth of a newton metre.
-    #[serde(rename = "N mm", alias = "mN m")]
-    NewtonMillimetre,
-    /// Newton.
-    #[serde(rename = "N")]
-    Newton,
-    /// Millinewton.
-    #[serde(rename = "mN")]
-    Millinewton,
-    /// Second.
-    #[serde(rename = "s")]
-    Second,
-    /// Millisecond.
-    #[serde(rename = "ms")]
-    Millisecond,
-    /// Microsecond.
-    #[serde(rename = "us")]
-    Microsecond,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColumnUnit {
+    /// Its name in a mapping.
+    pub name: &'static str,
+    /// How many SI units one is (1).
+    pub factor: f64,
+    /// Which SI unit that is: `rad`, `m`, `N m`, `N` or `s`.
+    pub si: &'static str,
+    /// How logs write it, in small letters without blanks, dots and stars.
+    spellings: &'static str,
 }
 
+const fn unit(name: &'static str, factor: f64, si: &'static str, spellings: &'static str) -> ColumnUnit {
+    ColumnUnit { name, factor, si, spellings }
+}
+
+const UNITS: [ColumnUnit; 13] = [
+    unit("rad", 1.0, "rad", "rad"),
+    unit("deg", std::f64::consts::PI / 180.0, "rad", "deg degree degrees °"),
+    unit("m", 1.0, "m", "m"),
+    unit("cm", 1e-2, "m", "cm"),
+    unit("mm", 1e-3, "m", "mm"),
+    unit("N m", 1.0, "N m", "nm"),
+    unit("N cm", 1e-2, "N m", "ncm"),
+    unit("N mm", 1e-3, "N m", "nmm mnm"),
+    unit("N", 1.0, "N", "n"),
+    unit("mN", 1e-3, "N", "mn"),
+    unit("s", 1.0, "s", "s sec seconds"),
+    unit("ms", 1e-3, "s", "ms"),
+    unit("us", 1e-6, "s", "us µs"),
+];
+
 impl ColumnUnit {
-    /// Its name in a mapping.
+    /// The unit that a mapping calls `name`.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Radian => "rad",
-            Self::Degree => "deg",
-            Self::Metre => "m",
-            Self::Centimetre => "cm",
-            Self::Millimetre => "mm",
-            Self::NewtonMetre => "N m",
-            Self::NewtonCentimetre => "N cm",
-            Self::NewtonMillimetre => "N mm",
-            Self::Newton => "N",
-            Self::Millinewton => "mN",
-            Self::Second => "s",
-            Self::Millisecond => "ms",
-            Self::Microsecond => "us",
-        }
+    pub fn named(name: &str) -> Option<Self> {
+        let name = if name == "mN m" { "N mm" } else { name };
+        UNITS.into_iter().find(|unit| unit.name == name)
     }
 
-    /// How many SI units one is, and which.
-    #[must_use]
-    pub fn in_si(self) -> (f64, &'static str) {
-        match self {
-            Self::Radian => (1.0, "rad"),
-            Self::Degree => (std::f64::consts::PI / 180.0, "rad"),
-            Self::Metre => (1.0, "m"),
-            Self::Centimetre => (1e-2, "m"),
-            Self::Millimetre => (1e-3, "m"),
-            Self::NewtonMetre => (1.0, "N m"),
-            Self::NewtonCentimetre => (1e-2, "N m"),
-            Self::NewtonMillimetre => (1e-3, "N m"),
-            Self::Newton => (1.0, "N"),
-            Self::Millinewton => (1e-3, "N"),
-            Self::Second => (1.0, "s"),
-            Self::Millisecond => (1e-3, "s"),
-            Self::Microsecond => (1e-6, "s"),
-        }
+    /// The unit that a log writes as `text`.
+    pub(super) fn spelt(text: &str) -> Option<Self> {
+        let text: String = text.chars().filter(|c| !matches!(c, ' ' | '.' | '*' | '·' | '-')).collect();
+        let text = text.to_lowercase();
+        UNITS.into_iter().find(|unit| unit.spellings.split(' ').any(|spelling| spelling == text))
+    }
+}
+
+impl<'de> Deserialize<'de> for ColumnUnit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let known = || UNITS.map(|unit| format!("`{}`", unit.name)).join(", ");
+        let unknown = || Error::custom(format!("unknown variant `{name}`, expected one of {}", known()));
+        Self::named(&name).ok_or_else(unknown)
     }
 }

@@ -58,13 +58,9 @@ impl Window {
         let last = self.rows.len() - 1;
         let before = &self.rows[self.next.saturating_sub(self.speed_rows)];
         let after = &self.rows[(self.next + self.speed_rows).min(last)];
-        let mut speed = JointVector::zeros(row.q.len());
         let time = after.time - before.time;
-        if time > f64::MIN_POSITIVE {
-            for (joint, value) in speed.iter_mut().enumerate() {
-                *value = (after.q[joint] - before.q[joint]) / time;
-            }
-        }
+        let rate = |(after, before): (&f64, &f64)| if time > f64::MIN_POSITIVE { (after - before) / time } else { 0.0 };
+        let speed = after.q.iter().zip(before.q.iter()).map(rate).collect();
         let seen = Seen { row, speed, outlier: self.outliers.is_some_and(|limit| self.is_outlier(&row, limit)) };
         self.next += 1;
         if self.next > self.reach() {

@@ -6,12 +6,12 @@
 //! have in energy under a pressure whose edge their nodes do not follow. Coarser cubes take a tenth of the work of
 //! those in question; finer ones would take some thirty times as much.
 
-use super::{Compliance, Object, topology};
+use super::{Compliance, Mechanics, Object, topology};
 use crate::scene::{ElasticSpec, Material, ObjectSpec};
 use crate::{Error, cache::Cache};
 use glam::DVec3;
 use serde::Serialize;
-use std::fmt;
+use std::{fmt, sync::OnceLock};
 
 /// Size of the coarser cubes, in those of the lattice (1).
 const COARSER: f64 = 1.5;
@@ -108,15 +108,13 @@ impl Object {
     /// The same around `nodes`, from cubes of the size `coarser` (m), relative to the compliance (1).
     fn relative_error(&self, elastic: &ElasticSpec, coarser: f64, nodes: &[u32]) -> Option<f64> {
         let material = Material::Elastic(ElasticSpec { cell: Some(coarser), ..elastic.clone() });
-        let coarser = ObjectSpec { material, ..self.spec.clone() };
-        let coarser = Self::from_surface(&coarser, self.rest.clone(), self.triangles.clone()).ok()?;
+        let spec = ObjectSpec { material, ..self.spec.clone() };
+        let coarser = Self { spec, mechanics: OnceLock::new(), ..self.clone() };
         let radius = RADIUS * topology::mean_edge(&self.rest, &self.triangles);
-        let error = |&node: &u32| {
-            let forces = self.pressure(node as usize, radius);
-            let [coarser, own] = [&coarser, self].map(|object| object.work(&forces).ok());
-            Some(INDEX * (coarser? / own? - 1.0).abs())
-        };
-        let mut errors = nodes.iter().map(error).collect::<Option<Vec<f64>>>()?;
+        let forces: Vec<_> = nodes.iter().map(|&node| self.pressure(node as usize, radius)).collect();
+        let [own, coarser] = [self, &coarser].map(|object| object.works(&forces).ok());
+        let error = |(own, coarser): (f64, f64)| INDEX * (coarser / own - 1.0).abs();
+        let mut errors: Vec<f64> = own?.into_iter().zip(coarser?).map(error).collect();
         errors.sort_unstable_by(f64::total_cmp);
         Some(errors[errors.len() / 2])
     }
@@ -143,9 +141,17 @@ impl Object {
         forces
     }
 
-    /// Work of `forces` on the surface's nodes along the displacement that they cause.
-    fn work(&self, forces: &[DVec3]) -> Result<f64, Error> {
-        let displacement = self.mechanics()?.displacement_under(forces);
-        Ok(forces.iter().zip(displacement).map(|(force, u)| force.dot(u)).sum())
+    /// Work of each of `forces` on the surface's nodes along the displacement that it causes (J), this being a solid: its
+    /// matrix has three rows a node.
+    fn works(&self, forces: &[Vec<DVec3>]) -> Result<Vec<f64>, Error> {
+        let Mechanics { moved, attachment, factor, .. } = self.mechanics()?;
+        let column = |forces: &Vec<DVec3>| {
+            let mut loads = vec![DVec3::ZERO; moved.len()];
+            attachment.spread(forces, &mut loads);
+            let numbers = loads.iter().flat_map(|load| load.to_array());
+            numbers.enumerate().filter(|(_, load)| *load != 0.0).collect()
+        };
+        let columns: Vec<Vec<(usize, f64)>> = forces.iter().map(column).collect();
+        Ok(factor.condensed(&columns).into_iter().step_by(columns.len() + 1).collect())
     }
 }

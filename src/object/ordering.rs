@@ -1,13 +1,14 @@
 //! In which order a factorisation takes the nodes: nested dissection by their positions.
 //!
-//! The nodes are halved near the median along the longest side of their box; the nodes of one half that have a
-//! neighbour in the other separate the two and come last, after both halves, each ordered in the same way (George,
-//! Nested dissection of a regular finite element mesh, 1973). Eliminating a node then fills in only what its own part
-//! and the separators around it hold: O(N log N) entries of the factor on a surface, O(N^(4/3)) in a solid. Meshes of
-//! points in space dissect better by geometry than by minimum degree on the graph, and faster.
+//! A plane parts the nodes; those on one side of it that have a neighbour on the other separate the two sides and come
+//! last, after both, each ordered in the same way (George, Nested dissection of a regular finite element mesh, 1973).
+//! Eliminating a node then fills in only what its own part and the separators around it hold: O(N log N) entries of the
+//! factor on a surface, O(N^(4/3)) in a solid. Meshes of points in space dissect better by geometry than by minimum
+//! degree on the graph, and faster.
 //!
-//! Nodes of a lattice lie in layers. A cut between two layers bounds the cubes on one of its sides: there one layer
-//! separates the halves, on the other two, which makes twice the entries. So the smaller of both separators is taken.
+//! Of all planes across the three axes that one is taken for which s^2 / (a b) is least, s being the size of the
+//! separator and a and b those of the parts: a separator costs its square, and saves the entries between the parts. In
+//! a lattice it lies between cubes, and beside a region of small cubes rather than through it.
 
 use super::Stiffness;
 use glam::DVec3;
@@ -15,46 +16,84 @@ use glam::DVec3;
 /// Parts of at most as many nodes are not cut any further: within them fill hardly depends on the order.
 const SMALLEST_PART: usize = 8;
 
+/// Number of no layer.
+const ABSENT: usize = usize::MAX;
+
 /// All nodes of `stiffness`, first to be eliminated first; `positions` of each (m).
 pub(super) fn nested_dissection(stiffness: &Stiffness, positions: &[DVec3]) -> Vec<u32> {
-    let mut nodes: Vec<u32> = (0..positions.len() as u32).collect();
-    let mut ordered = Vec::with_capacity(nodes.len());
-    let mut side = vec![false; nodes.len()];
-    dissect(stiffness, positions, &mut nodes, &mut side, &mut ordered);
+    let mut ordered = Vec::with_capacity(positions.len());
+    let mut layers = vec![ABSENT; positions.len()];
+    dissect(stiffness, positions, (0..positions.len() as u32).collect(), &mut layers, &mut ordered);
     ordered
 }
 
-/// Appends `nodes` in their order. `side` is false for all nodes, before and after.
-fn dissect(stiffness: &Stiffness, positions: &[DVec3], nodes: &mut [u32], side: &mut [bool], ordered: &mut Vec<u32>) {
-    if nodes.len() <= SMALLEST_PART {
-        ordered.extend_from_slice(nodes);
+/// A plane between two layers of nodes, and the side of it on which those that touch the other side separate the two.
+struct Cut {
+    /// It is across this axis.
+    axis: usize,
+    /// The first place above it (m).
+    above: f64,
+    /// Whether the separator is below it.
+    is_below: bool,
+    /// What the least of is best (1).
+    cost: f64,
+}
+
+/// Appends `nodes` in their order. `layers` are absent for all nodes, before and after.
+fn dissect(stiffness: &Stiffness, positions: &[DVec3], nodes: Vec<u32>, layers: &mut [usize], ordered: &mut Vec<u32>) {
+    let cuts = |axis| cuts(stiffness, positions, &nodes, axis, layers);
+    let axes = if nodes.len() > SMALLEST_PART { 0..3 } else { 0..0 };
+    let Some(cut) = axes.flat_map(cuts).min_by(|a, b| a.cost.total_cmp(&b.cost)) else {
+        ordered.extend(nodes);
         return;
-    }
-    let place = |node: u32| positions[node as usize];
-    let low = nodes.iter().map(|&node| place(node)).fold(DVec3::INFINITY, DVec3::min);
-    let high = nodes.iter().map(|&node| place(node)).fold(DVec3::NEG_INFINITY, DVec3::max);
-    let axis = (high - low).max_position();
-    nodes.sort_unstable_by(|&a, &b| place(a)[axis].total_cmp(&place(b)[axis]).then(a.cmp(&b)));
-    let middle = nodes.len() / 2;
-    let is_between_layers = |cut: &usize| place(nodes[*cut])[axis] > place(nodes[cut - 1])[axis];
-    let cut = (1..=middle).rev().find(is_between_layers).unwrap_or(middle);
-    let (left, right) = nodes.split_at(cut);
-    let mut separate = |[part, other]: [&[u32]; 2]| {
-        other.iter().for_each(|&node| side[node as usize] = true);
-        let touches = |node: u32| stiffness.row(node as usize).any(|(neighbour, _)| side[neighbour]);
-        let (separator, inner): (Vec<u32>, Vec<u32>) = part.iter().partition(|node| touches(**node));
-        other.iter().for_each(|&node| side[node as usize] = false);
-        (separator, [inner, other.to_vec()])
     };
-    let ways = [[left, right], [right, left]].map(&mut separate);
-    let best = ways.into_iter().min_by_key(|(separator, _)| separator.len());
-    if let Some((mut separator, parts)) = best {
-        for mut part in parts {
-            dissect(stiffness, positions, &mut part, side, ordered);
-        }
-        separator.sort_unstable();
-        ordered.append(&mut separator);
+    let is_below = |node: usize| positions[node][cut.axis] < cut.above;
+    nodes.iter().for_each(|&node| layers[node as usize] = usize::from(is_below(node as usize)));
+    let other_side = usize::from(!cut.is_below);
+    let separates = |node: u32| {
+        let mut around = stiffness.row(node as usize).map(|(other, _)| layers[other]);
+        is_below(node as usize) == cut.is_below && around.any(|side| side == other_side)
+    };
+    let (separator, rest): (Vec<u32>, Vec<u32>) = nodes.iter().partition(|node| separates(**node));
+    nodes.iter().for_each(|&node| layers[node as usize] = ABSENT);
+    let (below, above) = rest.into_iter().partition(|&node| is_below(node as usize));
+    for part in [below, above] {
+        dissect(stiffness, positions, part, layers, ordered);
     }
+    ordered.extend(separator);
+}
+
+/// All cuts of `nodes` across `axis`. `layers` are absent for all nodes, before and after.
+fn cuts(stiffness: &Stiffness, positions: &[DVec3], nodes: &[u32], axis: usize, layers: &mut [usize]) -> Vec<Cut> {
+    let place = |node: &u32| positions[*node as usize][axis];
+    let mut places: Vec<f64> = nodes.iter().map(place).collect();
+    places.sort_unstable_by(f64::total_cmp);
+    places.dedup();
+    nodes.iter().for_each(|node| layers[*node as usize] = places.partition_point(|other| *other < place(node)));
+    // By how much these numbers change from each cut to the next: nodes below it, and those of either separator.
+    let mut changes = vec![[0_isize; 3]; places.len() + 1];
+    for &node in nodes {
+        let own = layers[node as usize];
+        let around = stiffness.row(node as usize).map(|(other, _)| layers[other]).filter(|layer| *layer != ABSENT);
+        let [least, most] = around.fold([own; 2], |[least, most], layer| [least.min(layer), most.max(layer)]);
+        for (cut, number, change) in [(own, 0, 1), (own, 1, 1), (most, 1, -1), (least, 2, 1), (own, 2, -1)] {
+            changes[cut + 1][number] += change;
+        }
+    }
+    nodes.iter().for_each(|node| layers[*node as usize] = ABSENT);
+    let (mut below, mut separators) = (0, [0; 2]);
+    let mut cuts = Vec::new();
+    for (&above, [more, others @ ..]) in places.iter().zip(changes).skip(1) {
+        below += more;
+        for (k, is_below) in [true, false].into_iter().enumerate() {
+            separators[k] += others[k];
+            let side = if is_below { below } else { nodes.len() as isize - below };
+            let [separator, one, other] =
+                [separators[k], side - separators[k], nodes.len() as isize - side].map(|count| count as f64);
+            cuts.push(Cut { axis, above, is_below, cost: separator * separator / (one * other) });
+        }
+    }
+    cuts
 }
 
 #[cfg(test)]
@@ -121,6 +160,20 @@ mod tests {
         let ordered = nested_dissection(&Stiffness::with_pattern(positions.len(), &cubes), &positions);
         let last = &ordered[ordered.len() - 81..];
         assert!(last.iter().all(|&node| positions[node as usize].x == 4.0), "not between two cubes: {last:?}");
+    }
+
+    /// A large and a small block, joined by one node that lies far from the median.
+    #[test]
+    fn a_narrow_place_separates_rather_than_the_median() {
+        let is_there = |[x, y, z]: [u32; 3]| x < 9 || x > 9 || y == 2 && z == 2;
+        let all = (0..13 * 25).map(|k| [k / 25, k / 5 % 5, k % 5]).filter(|at| is_there(*at));
+        let positions: Vec<DVec3> = all.map(|at| DVec3::from_array(at.map(f64::from))).collect();
+        let count = positions.len() as u32;
+        let pairs = (0..count).flat_map(|a| (0..a).map(move |b| [a, b]));
+        let edges: Vec<[u32; 2]> =
+            pairs.filter(|pair| positions[pair[0] as usize].distance(positions[pair[1] as usize]) < 1.5).collect();
+        let ordered = nested_dissection(&Stiffness::with_pattern(positions.len(), &edges), &positions);
+        assert_eq!(positions[ordered[ordered.len() - 1] as usize], DVec3::new(9.0, 2.0, 2.0));
     }
 
     #[test]

@@ -132,7 +132,7 @@ pub(super) fn place(position: DVec3) -> [u64; 3] {
 
 fn check_triangles(nodes: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     if triangles.is_empty() {
-        return Err("the surface has no triangles".into());
+        return Err("the surface has no triangles: export its faces, not points or lines alone".into());
     }
     let mut seen = HashMap::with_capacity(triangles.len());
     for (triangle, corners) in triangles.iter().enumerate() {

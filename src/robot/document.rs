@@ -13,6 +13,12 @@ const LARGEST: f64 = 1e6;
 const XACRO: &str =
     "this is xacro, which is a program, not a robot: run `xacro FILE > ROBOT.urdf` (pip install xacro) and import that";
 
+/// Refuses an expression of xacro.
+pub(super) fn check_plain(text: &str) -> Result<(), String> {
+    let is_expression = text.contains("${") || text.contains("$(");
+    if is_expression { Err(format!("{text:?} is an expression of xacro: {XACRO}")) } else { Ok(()) }
+}
+
 /// Text of a robot file.
 pub(super) struct Source<'a> {
     pub path: &'a Path,
@@ -41,8 +47,12 @@ impl<'a> Source<'a> {
             return Err(self.error(0..0, XACRO));
         }
         let document = xml::parse(self.text).map_err(|error| {
-            let is_xacro = error.prefix.as_deref() == Some("xacro");
-            self.error(error.span, if is_xacro { XACRO.to_owned() } else { error.reason })
+            let reason = match error.prefix.as_deref() {
+                Some("xacro") => XACRO.to_owned(),
+                _ if !self.text.trim_start().starts_with('<') => "this is no URDF and no MJCF file".to_owned(),
+                _ => error.reason,
+            };
+            self.error(error.span, reason)
         })?;
         let is_xacro = |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|uri| uri.contains("xacro"));
         match document.descendants().find(is_xacro) {
@@ -66,9 +76,7 @@ impl<'a> Source<'a> {
         let Some(attribute) = node.attribute_node(name) else { return Ok(None) };
         let text = attribute.value();
         let bad = |message: String| self.error(attribute.range(), message);
-        if text.contains("${") || text.contains("$(") {
-            return Err(bad(format!("{text:?} is an expression of xacro: {XACRO}")));
-        }
+        check_plain(text).map_err(bad)?;
         let number = |word: &str| {
             let number: f64 = word.parse().map_err(|_| bad(format!("{name} has {word:?}, which is no number")))?;
             let in_range = number.abs() <= LARGEST;

@@ -4,6 +4,7 @@
 //! that name, or whose package.xml has it, that holds the robot file or lies beside one that does, or is in the folder
 //! that the user names. No program is asked for it.
 
+use super::document::check_plain;
 use roxmltree::Document;
 use std::{
     fs::File,
@@ -16,6 +17,7 @@ use std::{
 /// # Errors
 /// The reason and the remedy, if no such file is there.
 pub(super) fn resolve(name: &str, robot: &Path, packages: Option<&Path>) -> Result<PathBuf, String> {
+    check_plain(name)?;
     let folder = robot.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if let Some(path) = name.strip_prefix("package://").or_else(|| name.strip_prefix("model://")) {
         let (package, inside) = path.split_once('/').unwrap_or((path, ""));

@@ -78,10 +78,6 @@ impl Course {
 
 /// Returns the positions of `joints`; `None` if one is missing or no finite number.
 fn positions(state: &JointState, joints: &[String]) -> Option<JointVector> {
-    let mut q = JointVector::zeros(joints.len());
-    for (q, joint) in q.iter_mut().zip(joints) {
-        let place = state.names.iter().position(|name| name == joint)?;
-        *q = state.position.get(place).copied().filter(|x| x.is_finite())?;
-    }
-    Some(q)
+    let place = |joint: &String| state.names.iter().position(|name| name == joint);
+    joints.iter().map(|joint| state.position.get(place(joint)?).copied().filter(|x| x.is_finite())).collect()
 }

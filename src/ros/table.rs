@@ -58,16 +58,13 @@ impl Survey {
     /// Takes a message in.
     fn take(&mut self, bytes: &[u8]) {
         self.messages += 1;
-        if self.refused.is_some() {
-            return;
-        }
-        match JointState::decode(bytes) {
-            Err(what) => self.refused = Some((self.messages, what)),
-            Ok(state) => self.add(state),
+        if self.refused.is_none() {
+            let added = JointState::decode(bytes).and_then(|state| self.add(state));
+            self.refused = added.err().map(|what| (self.messages, what));
         }
     }
 
-    fn add(&mut self, state: JointState) {
+    fn add(&mut self, state: JointState) -> Result<(), String> {
         self.stamped |= state.stamp > 0;
         self.has_effort |= state.effort.iter().any(|effort| effort.is_finite());
         for joint in state.names {
@@ -77,9 +74,9 @@ impl Survey {
             }
         }
         if self.joints.len() > MOST_JOINTS {
-            let what = format!("its messages name more than {MOST_JOINTS} joints");
-            self.refused = Some((self.messages, what));
+            return Err(format!("its messages name more than {MOST_JOINTS} joints"));
         }
+        Ok(())
     }
 }
 
@@ -88,10 +85,7 @@ impl Survey {
 pub struct JointStateTable {
     messages: Messages,
     topic: String,
-    joints: Vec<String>,
-    /// Number of each joint.
-    numbers: BTreeMap<String, usize>,
-    stamped: bool,
+    survey: Survey,
     number: u64,
     text: String,
     read: usize,
@@ -110,36 +104,36 @@ impl JointStateTable {
         }
         let count = |(name, survey): (&String, &Survey)| Topic { name: name.clone(), messages: survey.messages };
         let topic = chosen(path, &surveys.iter().map(count).collect::<Vec<_>>(), topic)?;
-        let Survey { messages, joints, numbers, stamped, has_effort, refused } =
-            surveys.remove(&topic).unwrap_or_default();
-        if let Some((number, what)) = refused {
-            return Err(no_state(path, &topic, number, &what));
+        let survey = surveys.remove(&topic).unwrap_or_default();
+        if let Some((number, what)) = &survey.refused {
+            return Err(no_state(path, &topic, *number, what));
         }
-        if joints.is_empty() {
+        if survey.joints.is_empty() {
             let what = format!("no message of {topic} names a joint: give the joints names where they are published");
             return Err(Error::at(path, what));
         }
-        if !has_effort {
+        if !survey.has_effort {
             let what = format!(
-                "no message of {topic} gives an effort, of {messages} in all, and a torque is made of it: record from a \
-                 driver that publishes efforts"
+                "no message of {topic} gives an effort, of {} in all, and a torque is made of it: record from a driver that \
+                 publishes efforts",
+                survey.messages
             );
             return Err(Error::at(path, what));
         }
         let mut text = "time".to_owned();
-        for joint in &joints {
+        for joint in &survey.joints {
             for what in ["position", "velocity", "effort"] {
                 let _ = write!(text, ",{what} {}", plain(joint));
             }
         }
         text.push('\n');
-        Ok(Self { messages: Messages::open(path)?, topic, joints, numbers, stamped, number: 0, text, read: 0 })
+        Ok(Self { messages: Messages::open(path)?, topic, survey, number: 0, text, read: 0 })
     }
 
     /// Returns the names of all joints.
     #[must_use]
     pub fn joints(&self) -> &[String] {
-        &self.joints
+        &self.survey.joints
     }
 
     /// Returns the topic.
@@ -159,12 +153,12 @@ impl JointStateTable {
         };
         self.number += 1;
         let state = decode(&self.messages.path, &self.topic, self.number, &bytes)?;
-        let nanoseconds = if self.stamped { state.stamp } else { logged };
+        let nanoseconds = if self.survey.stamped { state.stamp } else { logged };
         (self.read, self.text) = (0, String::new());
         let _ = write!(self.text, "{}.{:09}", nanoseconds / 1_000_000_000, nanoseconds % 1_000_000_000);
-        let mut places = vec![None; self.joints.len()];
+        let mut places = vec![None; self.survey.joints.len()];
         for (place, name) in state.names.iter().enumerate().rev() {
-            if let Some(&joint) = self.numbers.get(name) {
+            if let Some(&joint) = self.survey.numbers.get(name) {
                 places[joint] = Some(place);
             }
         }

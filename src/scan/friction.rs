@@ -111,12 +111,7 @@ fn slip(chain: &Chain, node: usize, q: &[f64], torque: &JointVector) -> Option<S
 /// held.
 fn passes(press: &ForceHistory, chain: &Chain, node: usize, axis: DVec3, reach: f64) -> Vec<Pass> {
     let joints = chain.joints.len();
-    let rows: Vec<[JointVector; 2]> = press
-        .configurations
-        .chunks_exact(joints)
-        .zip(press.torques.chunks_exact(joints))
-        .map(|(q, torque)| [q, torque].map(JointVector::from_slice))
-        .collect();
+    let rows: Vec<[JointVector; 2]> = (0..press.times.len()).map(|row| press.row(row, joints)).collect();
     let Some(held) = press.counts.iter().rposition(|held| *held) else { return Vec::new() };
     let position = |row: usize| {
         let links = chain.links(&rows[row][0]);

@@ -14,6 +14,7 @@ use crate::{
     input,
     names::counted,
 };
+use clap::{ValueEnum, builder::PossibleValue};
 use std::{
     fmt::Write as _,
     fs::{File, OpenOptions},
@@ -31,7 +32,7 @@ const GUIDED: &str = "led by hand";
 const MOST_ROWS: usize = 5_000_000;
 
 /// How a point ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum RowStatus {
     /// Measured in steady contact.
     Steady,
@@ -46,26 +47,10 @@ pub enum RowStatus {
 }
 
 impl RowStatus {
-    const ALL: [(Self, &'static str); 5] = [
-        (Self::Steady, "steady"),
-        (Self::Unsteady, "unsteady"),
-        (Self::Limit, "limit"),
-        (Self::Moving, "moving"),
-        (Self::Held, "held"),
-    ];
-
     /// Whether the row is part of a press that is recorded, of which the object's memory and friction are identified.
     #[must_use]
     pub fn is_recorded(self) -> bool {
         matches!(self, Self::Moving | Self::Held)
-    }
-
-    fn name(self) -> &'static str {
-        Self::ALL.into_iter().find(|(status, _)| *status == self).map_or("", |(_, name)| name)
-    }
-
-    fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|(_, known)| *known == name).map(|(status, _)| status)
     }
 }
 
@@ -172,7 +157,7 @@ impl LogWriter {
         };
         let file = OpenOptions::new().write(true).create_new(true).open(path).map_err(refused)?;
         let mut writer = Self { path: path.to_owned(), file: BufWriter::new(file) };
-        writer.write(&header.text())?;
+        writer.write(|file| file.write_all(header.text().as_bytes()))?;
         Ok(writer)
     }
 
@@ -202,12 +187,11 @@ impl LogWriter {
     /// # Errors
     /// Those of the file.
     pub fn append(&mut self, row: &ScanRow) -> Result<(), Error> {
-        let written = write_row(row, &mut self.file).and_then(|()| self.file.flush());
-        written.map_err(|source| failed(&self.path, &source))
+        self.write(|file| write_row(row, file))
     }
 
-    fn write(&mut self, text: &str) -> Result<(), Error> {
-        let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.flush());
+    fn write(&mut self, write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<(), Error> {
+        let written = write(&mut self.file).and_then(|()| self.file.flush());
         written.map_err(|source| failed(&self.path, &source))
     }
 }
@@ -216,7 +200,8 @@ fn write_row(row: &ScanRow, out: impl Write) -> io::Result<()> {
     let mut table = Table::new(out);
     table.field(row.point)?.field(row.time)?;
     table.fields(row.q.iter().chain(row.torque.iter()).chain(row.deviation.iter()))?;
-    table.field(row.ticks)?.field(row.status.name())?.end()
+    let status = row.status.to_possible_value();
+    table.field(row.ticks)?.fields(status.as_ref().map(PossibleValue::get_name))?.end()
 }
 
 /// Length of the file up to its last line end (bytes).
@@ -264,7 +249,7 @@ impl ScanLog {
         if lines.next(&mut text)?.is_some_and(|line| line != SIGNATURE.as_bytes()) {
             let what = format!(
                 "not a scan log (its first line is not `{SIGNATURE}`); of other tables `haptize gridize` makes a dataset, by a \
-                 column mapping (--columns)"
+                 column mapping (--columns), which `haptize gridize --guess LOG` writes"
             );
             return Err(Error::at(path, what));
         }
@@ -310,10 +295,7 @@ impl ScanLog {
                 histories.push(ForceHistory::default());
             }
             if let Some(history) = histories.last_mut() {
-                history.times.push(row.time);
-                history.configurations.extend_from_slice(&row.q);
-                history.torques.extend_from_slice(&row.torque);
-                history.counts.push(row.status == RowStatus::Held);
+                history.push(row.time, &row.q, &row.torque, (row.status == RowStatus::Held, None));
             }
         }
         histories
@@ -362,10 +344,7 @@ fn row(line: &str, joints: usize) -> Result<ScanRow, String> {
         let wrong = || format!("column {} holds `{}`, not a finite number", column + 1, fields[column]);
         value.filter(|value| value.is_finite()).ok_or_else(wrong)
     };
-    let vector = |first: usize| {
-        let values: Result<Vec<f64>, String> = (first..first + joints).map(number).collect();
-        values.map(|values| JointVector::from_slice(&values))
-    };
+    let vector = |first: usize| (first..first + joints).map(number).collect::<Result<JointVector, String>>();
     let whole = |column: usize| {
         let wrong = || format!("column {} holds `{}`, not a whole number", column + 1, fields[column]);
         fields[column].parse::<u32>().map_err(|_| wrong())
@@ -377,8 +356,8 @@ fn row(line: &str, joints: usize) -> Result<ScanRow, String> {
         torque: vector(2 + joints)?,
         deviation: vector(2 + 2 * joints)?,
         ticks: whole(columns - 2)?,
-        status: RowStatus::named(fields[columns - 1])
-            .ok_or_else(|| format!("status `{}` is unknown", fields[columns - 1]))?,
+        status: RowStatus::from_str(fields[columns - 1], false)
+            .map_err(|_| format!("status `{}` is unknown", fields[columns - 1]))?,
     })
 }
 

@@ -39,12 +39,6 @@ impl PdControl {
         Self { stiffness, damping, commanded: position, commanded_speed: zero, history }
     }
 
-    /// Commanded position (rad or m).
-    #[must_use]
-    pub fn commanded(&self) -> &JointVector {
-        &self.commanded
-    }
-
     /// Moves the commanded position towards `target` for one `period` (s), no joint faster than `speed` (rad/s or m/s);
     /// true when it is there. All joints arrive at the same time.
     pub fn advance(&mut self, target: &JointVector, speed: f64, period: f64) -> bool {
@@ -103,7 +97,7 @@ mod tests {
         let target = vector([0.1, -0.05]);
         let ticks = (0..1000).position(|_| control.advance(&target, 0.5, 1e-3)).unwrap();
         assert_eq!(ticks, 199);
-        assert!((control.commanded()[0] - 0.1).abs() < 1e-12 && (control.commanded()[1] + 0.05).abs() < 1e-12);
+        assert!((control.commanded[0] - 0.1).abs() < 1e-12 && (control.commanded[1] + 0.05).abs() < 1e-12);
     }
 
     #[test]

@@ -73,13 +73,8 @@ impl Plan {
             PlanSpec::Joints(grid) => {
                 let counts: Vec<usize> = grid.axes.iter().map(|axis| axis.count).collect();
                 let points = checked_points(&counts)?;
-                let configuration = |place: &[usize]| {
-                    let values: Vec<f64> =
-                        grid.axes.iter().zip(place).map(|(axis, k)| axis.start + *k as f64 * axis.step).collect();
-                    JointVector::from_slice(&values)
-                };
                 let stop = |(point, place): (usize, Vec<usize>)| Stop {
-                    q: configuration(&place),
+                    q: grid.axes.iter().zip(place).map(|(axis, k)| axis.start + k as f64 * axis.step).collect(),
                     point: Some(point),
                     recorded: None,
                 };
@@ -91,9 +86,7 @@ impl Plan {
         }
         Ok(plan)
     }
-}
 
-impl Plan {
     /// `count` points of the plan, spread over it evenly however many follow (the golden ratio's multiples), from
     /// number `first` of that order on: for each the way point that leads there, or itself, and its configuration.
     #[must_use]
@@ -148,10 +141,8 @@ fn workspace(plan: &WorkspacePlan, spec: &ScanSpec, chain: &Chain) -> Result<Pla
     let recorded = spec.history.as_ref().map_or(0, |history| ((history.share * lines as f64) as usize).max(1));
     // The lines in the middle of so many equal parts.
     let is_recorded = |line: usize| (line + 1) * recorded / lines > line * recorded / lines;
-    let mut near = JointVector::zeros(chain.degrees_of_freedom());
-    for (q, joint) in near.iter_mut().zip(&chain.joints) {
-        *q = joint.limits[0].midpoint(joint.limits[1]);
-    }
+    let middles = chain.joints.iter().map(|joint| joint.limits[0].midpoint(joint.limits[1]));
+    let mut near: JointVector = middles.collect();
     for (line, place) in serpentine(&counts) {
         let (mut bottom, mut last) = (None, None);
         let offset = |axis: usize| plan.across[axis].direction * (place[axis] as f64 * plan.across[axis].spacing);

@@ -1,7 +1,7 @@
 //! The text of a scene file, read and checked; each failure names the place.
 
 use super::value::KEY;
-use super::{JointKind, JointSpec, ProxySpec};
+use super::{JointKind, JointSpec, ProxySpec, Scene};
 use crate::{Error, ErrorKind, JointVector, names::counted};
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
@@ -62,6 +62,11 @@ impl Checker<'_> {
             let message = match (error.message().strip_prefix(KEY), root) {
                 (Some(rest), Ok(root)) => {
                     format!("{} {rest}", key_at(root.get_ref(), span.start).unwrap_or("the value"))
+                }
+                (_, Err(_)) if self.path.extension().is_some() && !Scene::is_at(self.path) => {
+                    "this is no scene, which is TOML: a scene names a mesh in [object.mesh], and `haptize import` makes one of a \
+                     robot's file"
+                        .to_owned()
                 }
                 _ => error.message().to_owned(),
             };
@@ -134,7 +139,7 @@ impl Checker<'_> {
 
 /// The place of what `key` names in a TOML text, keys and numbers of entries with dots between; where there is no such
 /// thing, that of the table around it, and false.
-fn find(text: &str, key: &str) -> (Range<usize>, bool) {
+pub(crate) fn find(text: &str, key: &str) -> (Range<usize>, bool) {
     let Ok(root) = DeTable::parse(text) else { return (0..0, false) };
     let root = DeValue::Table(root.into_inner());
     let (mut place, mut value) = (0..0, &root);

@@ -56,7 +56,7 @@ pub(crate) use inertia::positive_semidefinite;
 pub(crate) use value::rotation;
 
 use crate::{Error, ErrorKind, names};
-pub(crate) use check::Checker;
+pub(crate) use check::{Checker, find as find_key};
 use clap::ValueEnum as _;
 use std::path::{Path, PathBuf};
 

@@ -8,7 +8,7 @@ use crate::{
     object::{Compliance, LatticeError, Object},
     proxy::Chain,
     random::Random,
-    scene::{AxisSpec, Scene},
+    scene::{AxisSpec, JointSpec, Scene},
 };
 use std::{
     path::{Path, PathBuf},
@@ -168,6 +168,11 @@ pub(crate) fn sweep_of<'a>(
     Ok(sweep)
 }
 
+/// A random configuration within the limits of `joints`.
+pub(super) fn drawn(random: &mut Random, joints: &[JointSpec]) -> JointVector {
+    joints.iter().map(|joint| random.between(joint.limits[0], joint.limits[1])).collect()
+}
+
 /// Grid points at which the proxy's reach is looked up, at most: between them it grows by less than what is added to
 /// it.
 const SAMPLES: usize = 1 << 16;
@@ -180,11 +185,7 @@ pub fn sample(scene: &Scene) -> Vec<JointVector> {
     let joints = &scene.proxy.joints;
     if joints.len() > MAX_AXES {
         let mut random = Random::new(1);
-        let mut draw = || {
-            let drawn = joints.iter().map(|joint| random.between(joint.limits[0], joint.limits[1]));
-            JointVector::from_slice(&drawn.collect::<Vec<_>>())
-        };
-        return (0..SAMPLES).map(|_| draw()).collect();
+        return (0..SAMPLES).map(|_| drawn(&mut random, joints)).collect();
     }
     let count = (SAMPLES as f64).powf(1.0 / joints.len().max(1) as f64) as usize;
     let limits =

@@ -2,7 +2,7 @@
 //! are kept, by a thread of its own: checksums and the file wait for no solver, and no solver for them.
 
 use super::{
-    Backend, Footprint, FreeSpace, Progress, Run, Sweep,
+    Backend, FreeSpace, Progress, Run, Sweep,
     error::{miscounted, no_memory, stopped},
     free_space::FreeGaps,
     part::Part,
@@ -170,21 +170,18 @@ impl Sweep<'_> {
         let mut course = Course {
             sweep: self,
             free_space: self.free_space(),
-            slab: 0..0,
             gaps: None,
             cut: resumed,
             chunks: VecDeque::new(),
             given: 0,
             size: ChunkSize::new(run.chunk.clamp(1, self.points().max(1)), backend.threads()),
             run,
+            facts: RunFacts { footprint, resumed_points: resumed, ..RunFacts::default() },
             tally,
             provenance,
             entries,
             room,
             part,
-            footprint,
-            resumed,
-            skipped: 0,
             start,
             taken: start,
             failure: None,
@@ -192,16 +189,10 @@ impl Sweep<'_> {
         course.tell();
         let streamed = backend.stream(&mut course);
         course.finish(streamed)?;
-        let facts = RunFacts {
-            footprint,
-            skipped_points: course.skipped,
-            resumed_points: resumed,
-            left_to_cpu: backend.left_to_cpu() - left_before,
-            lowered: None,
-            solving: start.elapsed(),
-            time: start.elapsed(),
-        };
-        Ok(Solved { tally: course.tally, facts, provenance: course.provenance })
+        let Course { tally, provenance, facts, .. } = course;
+        let (left_to_cpu, time) = (backend.left_to_cpu() - left_before, start.elapsed());
+        let facts = RunFacts { left_to_cpu, solving: time, time, ..facts };
+        Ok(Solved { tally, facts, provenance })
     }
 
     pub(super) fn gaps(&self, free_space: &FreeSpace<'_>, slab: Range<usize>) -> Result<FreeGaps, Error> {
@@ -215,8 +206,7 @@ struct Course<'c, 'r> {
     sweep: &'c Sweep<'c>,
     run: &'c mut Run<'r>,
     free_space: Option<FreeSpace<'c>>,
-    /// Points whose gaps are looked up, and what was found.
-    slab: Range<usize>,
+    /// What was found of the gaps of some points.
     gaps: Option<FreeGaps>,
     /// Number of points that were cut off the sweep's so far.
     cut: usize,
@@ -232,10 +222,7 @@ struct Course<'c, 'r> {
     room: Receiver<Tile<'static>>,
     /// Where results are kept.
     part: Option<PathBuf>,
-    footprint: Footprint,
-    /// Points that were there at the start, and points that were not solved.
-    resumed: usize,
-    skipped: usize,
+    facts: RunFacts,
     start: Instant,
     /// When the last chunk came back.
     taken: Instant,
@@ -251,8 +238,8 @@ impl Course<'_, '_> {
             done: tally.points,
             points,
             contact_points: tally.statuses.in_contact(),
-            rate: (tally.points - self.resumed) as f64 / seconds,
-            footprint: self.footprint,
+            rate: (tally.points - self.facts.resumed_points) as f64 / seconds,
+            footprint: self.facts.footprint,
             forecast: self.sweep.forecast,
         });
     }
@@ -270,12 +257,11 @@ impl Course<'_, '_> {
     fn look_for_free_space(&mut self) -> Result<(), Error> {
         let first = self.rest().start;
         if let Some(free_space) = &self.free_space
-            && !self.slab.contains(&first)
+            && self.gaps.as_ref().is_none_or(|gaps| !gaps.points().contains(&first))
         {
             // Of two slabs only one is kept.
             self.gaps = None;
-            self.slab = free_space.slab(first);
-            self.gaps = Some(self.sweep.gaps(free_space, self.slab.clone())?);
+            self.gaps = Some(self.sweep.gaps(free_space, free_space.slab(first))?);
         }
         Ok(())
     }
@@ -285,7 +271,7 @@ impl Course<'_, '_> {
         let (rest, most) = (self.rest(), self.size.size);
         let (mut solved, mut free_gaps) = (0, Vec::new());
         let end = rest.end.min(rest.start.saturating_add(together(most)));
-        let end = if self.free_space.is_some() { end.min(self.slab.end) } else { end };
+        let end = self.gaps.as_ref().map_or(end, |gaps| end.min(gaps.points().end));
         let mut point = rest.start;
         while point < end {
             let free_gap = self.gaps.as_ref().and_then(|gaps| gaps.gap(point));
@@ -320,7 +306,7 @@ impl Course<'_, '_> {
                 None => equilibria.next().into_iter().for_each(|solved| tile.push(solved, shape)),
             }
         }
-        self.skipped += chunk.points.len() - solved;
+        self.facts.skipped_points += chunk.points.len() - solved;
         self.tally.add(&tile, 0..tile.points());
         self.entries.send(Entry::Tile(tile)).map_err(|_| self.stopped())?;
         self.size.adapt(solved, self.taken.elapsed());

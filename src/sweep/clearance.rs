@@ -75,12 +75,18 @@ impl Clearance {
         let model = Model::reaching(object, &chain, scene.contact, &[])?;
         let mut proximity = Proximity::new(&model);
         let Some(q) = choose(&mut proximity) else { return Ok(None) };
-        let nearest = proximity.nearest(&q);
-        let node = &chain.nodes[nearest.node];
+        Ok(Some(Self::near(&model, &q)))
+    }
+
+    /// The gap of `model` at `q`.
+    #[must_use]
+    pub fn near(model: &Model<'_>, q: &[f64]) -> Self {
+        let nearest = Proximity::new(model).nearest(q);
+        let node = &model.chain.nodes[nearest.node];
         let way = nearest.position - nearest.surface;
         // The surface of the node is nearer than its middle by the radius.
         let motion = way - node.radius * way.normalize_or_zero();
-        Ok(Some(Self { q, link: chain.joints[node.link].name.clone(), nearest, motion }))
+        Self { q: q.to_vec(), link: model.chain.joints[node.link].name.clone(), nearest, motion }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The CPU backend: all cores, f64, one solver a thread.
 
-use super::Backend;
+use super::{Backend, grid_sweep::provenance};
 use crate::{
     Error, JointVector,
     contact::{Equilibrium, Model, SHARE, Solvers, Work},
@@ -53,15 +53,8 @@ impl<'a> CpuBackend<'a> {
     /// Returns the provenance of what this backend solves now of `scene`.
     #[must_use]
     pub fn provenance(scene: &Scene) -> Provenance {
-        Provenance {
-            version: env!("CARGO_PKG_VERSION").into(),
-            algorithm: scene.contact.law.name().into(),
-            tolerance: scene.contact.tolerance,
-            backend: "cpu".into(),
-            adapter: Self::adapter(),
-            date: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
-            ..Provenance::default()
-        }
+        let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
+        provenance(scene, ["cpu", &Self::adapter(), &date])
     }
 
     /// Returns the name of this backend in [`crate::dataset::Provenance::adapter`].

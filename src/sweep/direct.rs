@@ -13,15 +13,9 @@ use crate::{
     scene::Scene,
 };
 
-/// The object and the proxy of a scene, which a model borrows.
-struct Parts {
-    object: Object,
-    chain: Chain,
-}
-
 self_cell::self_cell!(
     struct Prepared {
-        owner: Parts,
+        owner: (Object, Chain),
         #[covariant]
         dependent: Model,
     }
@@ -46,11 +40,10 @@ impl Direct {
     /// # Errors
     /// When its compliance cannot be formed.
     pub fn of(scene: &Scene, object: Object) -> Result<Self, Error> {
-        let parts = Parts { object, chain: Chain::new(&scene.proxy) };
-        let prepared = Prepared::try_new(parts, |Parts { object, chain }| {
+        Prepared::try_new((object, Chain::new(&scene.proxy)), |(object, chain)| {
             Model::reaching(object, chain, scene.contact, &sample(scene))
-        })?;
-        Ok(Self(prepared))
+        })
+        .map(Self)
     }
 
     /// The object and the proxy, prepared.
@@ -62,7 +55,7 @@ impl Direct {
     /// Number of joints d.
     #[must_use]
     pub fn joints(&self) -> usize {
-        self.0.borrow_owner().chain.joints.len()
+        self.model().chain.joints.len()
     }
 
     /// The equilibrium at `q` in full, one coordinate a joint (rad or m).

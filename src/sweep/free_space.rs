@@ -167,10 +167,10 @@ impl FreeGaps {
         Some(f32::from_bits(bits)).filter(|gap| !gap.is_nan())
     }
 
-    /// Number of points that are skipped.
+    /// The points that were looked at.
     #[must_use]
-    pub fn skipped(&self) -> usize {
-        (self.first..self.first + self.bounds.len()).filter(|&point| self.gap(point).is_some()).count()
+    pub fn points(&self) -> Range<usize> {
+        self.first..self.first + self.bounds.len()
     }
 }
 

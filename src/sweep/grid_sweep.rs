@@ -130,15 +130,7 @@ impl<'a> Sweep<'a> {
             object: crc32fast::hash(object.key()),
             scene: scene.text.clone(),
             scene_path: std::path::absolute(&scene.path).unwrap_or_default().to_string_lossy().into_owned(),
-            provenance: Provenance {
-                version: env!("CARGO_PKG_VERSION").into(),
-                algorithm: scene.contact.law.name().into(),
-                tolerance: scene.contact.tolerance,
-                backend: backend.into(),
-                adapter: adapter.into(),
-                date: date.into(),
-                ..Provenance::default()
-            },
+            provenance: provenance(scene, [backend, adapter, date]),
         };
         Ok(Self {
             binding,
@@ -333,7 +325,8 @@ impl<'a> Sweep<'a> {
         let map = part.map().map_err(|source| in_part(&kept_in, &source))?;
         let mut table = part.table(&map, self.binding.shape)?;
         let (report, provenance) = self.complete(solved, &mut table, stop, Some(&kept_in))?;
-        let heading = Heading { grid: &self.binding.grid, provenance: &provenance, scene: &self.binding.scene };
+        let Binding { grid, scene, .. } = &self.binding;
+        let heading = Heading { grid, provenance: &provenance, scene, store: None };
         let results = Results::new(&table, report.points, self.stored(), stop);
         results.assemble(output, heading, &self.surface).map_err(|source| unwritten(source, report.points))?;
         drop(map);
@@ -397,6 +390,14 @@ impl<'a> Sweep<'a> {
     pub(super) fn free_space(&self) -> Option<FreeSpace<'_>> {
         self.model.map(|model| FreeSpace::new(model, &self.binding.grid))
     }
+}
+
+/// Where results come from that solve `scene`; `solved`: by which backend, on which adapter, when.
+pub(super) fn provenance(scene: &Scene, solved: [&str; 3]) -> Provenance {
+    let [backend, adapter, date] = solved.map(str::to_owned);
+    let (version, algorithm) = (env!("CARGO_PKG_VERSION").into(), scene.contact.law.name().into());
+    let tolerance = scene.contact.tolerance;
+    Provenance { version, algorithm, tolerance, backend, adapter, date, ..Provenance::default() }
 }
 
 /// Checks that `scene` has a grid.

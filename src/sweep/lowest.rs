@@ -282,8 +282,7 @@ impl Lattice for UniformGrid<'_, '_> {
     }
 
     fn neighbours(&self, point: usize) -> impl Iterator<Item = (usize, JointVector)> {
-        let mut spacing = JointVector::zeros(self.grid.joints());
-        spacing.iter_mut().zip(&self.grid.axes).for_each(|(spacing, axis)| *spacing = axis.step);
+        let spacing: JointVector = self.grid.axes.iter().map(|axis| axis.step).collect();
         self.grid.neighbours(point).flatten().flatten().map(move |n| (n, spacing))
     }
 

@@ -45,18 +45,13 @@ impl Contents {
         Ok(Self { path: path.into(), found, map })
     }
 
-    /// Whether all points of the shard are there, and nothing is damaged.
-    fn is_whole(&self) -> bool {
-        self.found.is_whole(&self.map)
-    }
-
     /// Whether this is the whole shard that `binding` is of.
     pub fn is_whole_of(&self, binding: &Binding) -> Result<bool, Error> {
         let its = &self.found.binding;
         let different = binding.other_sweep(its).or((binding.shard != its.shard).then_some("another shard"));
         match different {
             Some(difference) => Err(other_part(&self.path, difference)),
-            None => Ok(self.is_whole()),
+            None => Ok(self.found.is_whole(&self.map)),
         }
     }
 }
@@ -69,15 +64,6 @@ pub struct Merge {
     count: usize,
     /// Whole ones that are there twice, and damaged ones, a sentence without its full stop each.
     pub notes: Vec<String>,
-}
-
-/// A dataset put together.
-#[derive(Clone, Debug)]
-pub struct Merged {
-    /// Number of shards.
-    pub shards: usize,
-    /// As of a bake that is continued after its last point.
-    pub report: SweepReport,
 }
 
 impl Merge {
@@ -100,7 +86,7 @@ impl Merge {
                 return Err(different(&file, path, difference));
             }
             let Shard { index, .. } = shard.found.binding.shard;
-            if !shard.is_whole() {
+            if !shard.found.is_whole(&shard.map) {
                 notes.push(format!("{} is damaged: shard {index} counts as missing", file.display()));
             } else if let Some(kept) = shards.get(&index) {
                 notes.push(format!("shard {index} is there twice: {} is taken", kept.path.display()));
@@ -138,9 +124,11 @@ impl Merge {
     }
 
     /// Puts the dataset `output` together, with its error measured at `measured` configurations as in
-    /// [`super::Bake::measured`]. What an interrupted merge has left is continued.
+    /// [`super::Bake::measured`]. What an interrupted merge has left is continued. The report is that of a bake that is
+    /// continued after its last point.
     ///
-    /// # Errors When shards are missing, the output cannot be written, or the merge is stopped; an earlier file
+    /// # Errors
+    /// When shards are missing, the output cannot be written, or the merge is stopped; an earlier file
     /// `output` is then untouched.
     pub fn to_file(
         &self,
@@ -148,7 +136,7 @@ impl Merge {
         measured: Option<usize>,
         stop: &AtomicBool,
         progress: &mut dyn FnMut(Progress),
-    ) -> Result<Merged, Error> {
+    ) -> Result<SweepReport, Error> {
         let missing = self.missing();
         let Some(first) = self.shards.values().next().filter(|_| missing.is_empty()) else {
             return Err(self.lacks(&missing));
@@ -166,11 +154,10 @@ impl Merge {
         }
         self.copy(&sweep, output)?;
         let run = Run { chunk: 1, stop, progress };
-        let report = sweep.bake(&mut Idle, output, true, run).map_err(|error| match error.kind() {
+        sweep.bake(&mut Idle, output, true, run).map_err(|error| match error.kind() {
             ErrorKind::Stopped => error!("stopped; the same command continues").of(ErrorKind::Stopped),
             _ => error,
-        })?;
-        Ok(Merged { shards: self.count, report })
+        })
     }
 
     /// Copies what a part of `output` lacks into it.

@@ -52,7 +52,7 @@ pub use grid_sweep::{Progress, Run, Sweep, grid_of};
 pub use inspection::{Contact, Inspection, ObjectNode, ProxyNode};
 pub use lowest::Lowered;
 pub use measured::MOST_CONFIGURATIONS;
-pub use merge::{Merge, Merged};
+pub use merge::Merge;
 pub use pilot::{Aim, Choice, Cost, Pilot, Prospect, Trial};
 pub use placing::Placing;
 pub use plan::{Plan, ShardCost};

@@ -28,6 +28,7 @@ use crate::{
         root_of,
     },
 };
+use glam::Vec3;
 
 /// Depth behind the boundary at which contact is solved for a free node, over its gap (1). Larger: the slope is that of
 /// deeper contact, of which more nodes touch. Smaller: w is a root of less energy, which errs more.
@@ -53,6 +54,8 @@ pub(super) struct Solved {
     pub slip: Vec<f32>,
     /// Equilibrium at the node.
     pub result: PointResult,
+    /// Contact forces on the object's nodes there, ascending by node (N).
+    pub forces: Vec<(u32, Vec3)>,
     /// Equilibria that were solved in contact for it: none where nothing is near, two at most.
     pub equilibria: u32,
 }
@@ -92,7 +95,7 @@ pub(super) fn holding(solver: &mut Solver<'_>, q: &JointVector, here: &Equilibri
 }
 
 /// Solves the nodes at `configurations` together: contact by `backend`, the searches for the
-/// boundary by `solvers`. Returns each with its equilibrium.
+/// boundary by `solvers`.
 ///
 /// # Errors
 /// When the backend fails.
@@ -101,15 +104,15 @@ pub(super) fn solve_all<B: Backend>(
     solvers: &Solvers<'_>,
     configurations: &[JointVector],
     scale: &Scale,
-) -> Result<Vec<(Solved, Equilibrium)>, B::Error> {
+) -> Result<Vec<Solved>, B::Error> {
     let here = backend.solve(configurations)?;
     let held: Vec<(&JointVector, &Equilibrium)> = configurations.iter().zip(&here).collect();
     let begun = solvers.map(&held, |solver, (q, here)| begin(solver, q, here, scale));
     let behind: Vec<JointVector> = begun.iter().filter_map(|begun| begun.behind).collect();
     let mut beyond = backend.solve(&behind)?.into_iter();
-    let solved = begun.into_iter().zip(configurations.iter().zip(here)).map(|(begun, (q, here))| {
+    let solved = begun.into_iter().zip(held).map(|(begun, (q, here))| {
         let beyond = begun.behind.and_then(|_| beyond.next());
-        (begun.conclude(q, &here, beyond.as_ref(), scale), here)
+        begun.conclude(q, here, beyond.as_ref(), scale)
     });
     Ok(solved.collect())
 }
@@ -161,6 +164,7 @@ impl Begun {
             slip: slip.into_iter().map(|number| number as f32).collect(),
             record: limited(record, &scale.steps).into_iter().map(|number| number as f32).collect(),
             result: PointResult::of(here),
+            forces: here.forces.iter().map(|on| (on.node, on.force.as_vec3())).collect(),
             equilibria: u32::from(here.status.is_in_contact()) + u32::from(behind.is_some()),
         }
     }

@@ -12,12 +12,11 @@ use super::{BackendChoice, Bake, build_object, grid_sweep::check_given, referenc
 use crate::{
     Error,
     contact::Model,
-    dataset::Dataset,
     error,
     field::TorqueField,
     names::counted,
     proxy::Chain,
-    scene::{ContactSpec, EffortNorm, Interpolation, NormUnit, Scene},
+    scene::{ContactSpec, EffortNorm, HapticsSpec, Interpolation, NormUnit, Scene},
 };
 use serde::Serialize;
 use std::{fmt, str::FromStr, sync::atomic::AtomicBool, time::Instant};
@@ -231,7 +230,9 @@ impl Pilot {
                 bytes_per_point = bytes as f64 / points as f64;
             }
             for interpolation in Interpolation::ALL {
-                let (rms, worst) = errors(scene, &reference, &dataset, interpolation)?;
+                let HapticsSpec { threshold, boundary_slope, .. } = &scene.haptics;
+                let field = TorqueField::interpolated(&dataset, interpolation, *threshold, boundary_slope)?;
+                let (rms, worst) = reference.errors(|q| field.sample(q).torque);
                 let (interpolation, spacing) = (interpolation.name(), spacing::spacing_of(&spaced));
                 trials.push(Trial { interpolation, spacing, points, rms, worst });
             }
@@ -379,17 +380,6 @@ fn tolerance(scene: &Scene, model: &Model<'_>, reference: &Reference, error: f64
         }
     }
     Ok(scene.contact.tolerance)
-}
-
-fn errors(
-    scene: &Scene,
-    reference: &Reference,
-    dataset: &Dataset,
-    interpolation: Interpolation,
-) -> Result<(f64, f64), Error> {
-    let spec = &scene.haptics;
-    let field = TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)?;
-    Ok(reference.errors(|q| field.sample(q).torque))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::{build_object, grid_sweep::check_axes};
+use super::{bake::drawn, build_object, grid_sweep::check_axes};
 use crate::{
     Error, JointVector,
     contact::{Model, Proximity},
@@ -135,8 +135,7 @@ impl Placing {
         let chain = Chain::new(&scene.proxy);
         // No compliance is needed where nothing is solved.
         let model = Model::reaching(object, &chain, scene.contact, &[])?;
-        let mut middle = JointVector::zeros(chain.joints.len());
-        middle.iter_mut().zip(&chain.joints).for_each(|(q, joint)| *q = 0.5 * (joint.limits[0] + joint.limits[1]));
+        let middle: JointVector = chain.joints.iter().map(|joint| 0.5 * (joint.limits[0] + joint.limits[1])).collect();
         let mut pose = chain.new_pose();
         chain.pose(&middle, &mut pose);
         let tip = posture.map(|(node, _)| node).or_else(|| tip(&chain)).unwrap_or(0);
@@ -152,11 +151,8 @@ impl Placing {
         let (mut random, mut proximity) = (Random::new(SEED), Proximity::new(&model));
         let mut best: Option<Attempt> = None;
         for number in 0..POSTURES {
-            let mut start = posture.map_or(middle, |(_, q)| q);
-            if number > 0 {
-                let joints = start.iter_mut().zip(&chain.joints);
-                joints.for_each(|(q, joint)| *q = random.between(joint.limits[0], joint.limits[1]));
-            }
+            let first = posture.map_or(middle, |(_, q)| q);
+            let start = if number == 0 { first } else { drawn(&mut random, &chain.joints) };
             let attempt = stand.attempt(&mut proximity, tip, start);
             if best.as_ref().is_none_or(|best| attempt.is_better(best, standoff)) {
                 best = Some(attempt);

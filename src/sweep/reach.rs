@@ -5,7 +5,7 @@
 //! most as deep as asked for; the grid's ranges are the least box that holds all of it that was met. Its lines are so
 //! far apart that a step along any axis moves the proxy by about as much as along any other.
 
-use super::{build_object, grid_sweep::check_axes, spacing};
+use super::{bake::drawn, build_object, grid_sweep::check_axes, spacing};
 use crate::{
     Error, ErrorKind, JointVector,
     contact::{Model, NodeTree},
@@ -163,6 +163,10 @@ impl Reach {
         let contact = share(touching.len(), met.len());
         let (within, touching_within) =
             (met.iter().filter(is_within).count(), touching.iter().filter(is_within).count());
+        let within_depth = |depth: f64| {
+            let count = touching.iter().filter(|met| -met.gap <= depth).count();
+            DepthShare { depth, share: share(count, touching.len()) }
+        };
         let width = |range: [f64; 2]| range[1] - range[0];
         Ok(Self {
             configurations: met.len(),
@@ -172,15 +176,7 @@ impl Reach {
             body,
             shallow,
             deepest: touching.iter().filter(is_within).map(|met| -met.gap).fold(0.0, f64::max),
-            depths: DEPTHS
-                .map(|part| {
-                    let depth = part * body;
-                    DepthShare {
-                        depth,
-                        share: share(touching.iter().filter(|met| -met.gap <= depth).count(), touching.len()),
-                    }
-                })
-                .to_vec(),
+            depths: DEPTHS.map(|part| within_depth(part * body)).to_vec(),
             joints,
         })
     }
@@ -245,13 +241,7 @@ pub(crate) fn shallow(object: &Object) -> f64 {
 
 /// A round of random configurations within the joint limits.
 fn measured(model: &Model<'_>, tree: &NodeTree, scene: &Scene, random: &mut Random) -> Vec<Met> {
-    let joints = &scene.proxy.joints;
-    let place = |_| {
-        let mut q = JointVector::zeros(joints.len());
-        q.iter_mut().zip(joints).for_each(|(q, joint)| *q = random.between(joint.limits[0], joint.limits[1]));
-        q
-    };
-    let drawn: Vec<JointVector> = (0..ROUND).map(place).collect();
+    let drawn: Vec<JointVector> = (0..ROUND).map(|_| drawn(random, &scene.proxy.joints)).collect();
     drawn.into_par_iter().map(|q| Met { gap: tree.touching_gap(model, &q), q }).collect()
 }
 

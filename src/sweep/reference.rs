@@ -8,7 +8,7 @@ use crate::{
     error,
     names::counted,
     random::Random,
-    scene::{ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
+    scene::{AxisSpec, ContactSpec, EffortNorm, Interpolation, LEVER_ARM, Scene},
 };
 use rayon::prelude::*;
 
@@ -88,13 +88,8 @@ impl Reference {
     fn drawn(scene: &Scene, model: &Model<'_>, seed: u64, mut count: usize, contacts: usize) -> Result<Self, Error> {
         let mut random = Random::new(seed);
         let mut reference = Self::of(EffortNorm::of(scene), []);
-        let mut place = |_| {
-            let mut q = JointVector::zeros(scene.grid.axes.len());
-            for (q, axis) in q.iter_mut().zip(&scene.grid.axes) {
-                *q = axis.start + random.between(0.0, 1.0) * axis.step * (axis.count - 1) as f64;
-            }
-            q
-        };
+        let mut along = |axis: &AxisSpec| axis.start + random.between(0.0, 1.0) * axis.step * (axis.count - 1) as f64;
+        let mut place = |_| scene.grid.axes.iter().map(&mut along).collect();
         loop {
             let places: Vec<JointVector> = (reference.solved()..count).map(&mut place).collect();
             let solved = without_gaps(model, tight(scene.contact, REFERENCE_TOLERANCE), &places)?;
@@ -166,11 +161,7 @@ impl Reference {
             unit: self.norm.unit,
             interpolation: interpolation.name().to_owned(),
             errors,
-            cut: None,
-            geometry: None,
-            rounding: None,
-            rounded: None,
-            friction: None,
+            ..MeasuredError::default()
         }
     }
 

@@ -74,6 +74,7 @@ pub struct Iterations {
 }
 
 /// Facts about a run beside its results.
+#[derive(Default)]
 pub(super) struct RunFacts {
     pub footprint: Footprint,
     pub skipped_points: usize,

@@ -85,16 +85,8 @@ pub fn on_path(model: &Model<'_>, path: &[(JointVector, bool)]) -> Option<String
 #[must_use]
 pub fn of_store(model: &Model<'_>, store: &Store) -> Option<String> {
     let (space, mut random) = (store.space(), Random::new(SEED));
-    let blocks = store.blocks();
-    let solved = blocks.iter().filter_map(|(key, block)| Some((space.block(*key)?, block.nodes())));
-    let mut touching: Vec<(u32, Place)> = solved
-        .flat_map(|((level, block), nodes)| {
-            let touches = nodes.places().zip(&nodes.status).filter(|(_, status)| **status == Status::Contact as u8);
-            let touches = touches.fold(0_u64, |set, (place, _)| set | 1 << place);
-            let there = space.nodes(level, &block).filter(move |(place, _)| touches >> place & 1 == 1);
-            there.map(move |(_, node)| (level, node))
-        })
-        .collect();
+    let touching = store.nodes().filter(|node| node.status == Status::Contact as u8);
+    let mut touching: Vec<(u32, Place)> = touching.map(|node| (node.level, node.place)).collect();
     let level = touching.iter().map(|(level, _)| *level).max()?;
     touching.retain(|(at, _)| *at == level);
     let last = space.last(level);

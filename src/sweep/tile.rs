@@ -188,13 +188,9 @@ impl Tile<'_> {
 
     /// Result of a point.
     pub fn result(&self, row: usize, joints: usize) -> PointResult {
-        let mut torque = JointVector::zeros(joints);
-        for (joint, tau) in torque.iter_mut().enumerate() {
-            *tau = self.number(Stored::Torque, row * joints + joint);
-        }
         PointResult {
             status: self.status(row),
-            torque,
+            torque: (row * joints..(row + 1) * joints).map(|index| self.number(Stored::Torque, index)).collect(),
             energy: self.number(Stored::Energy, row),
             gap: self.number(Stored::Gap, row),
             residual: self.number(Stored::Residual, row),

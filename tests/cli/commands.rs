@@ -391,7 +391,7 @@ fn tables_that_cannot_be_gridized_are_refused_with_place_and_remedy() {
     for (arguments, expected) in [
         (&["none.csv", "--step", "1"][..], "none.csv: cannot be read"),
         (&["table.csv", "--step", "-1"], "table.csv: not a scan log"),
-        (&["table.csv", "--step", "1"], "--columns"),
+        (&["table.csv", "--step", "1"], "--columns), which `haptize gridize --guess LOG` writes"),
         (&["table.csv", "--step", "1", "--columns", "none.toml"], "none.toml: cannot be read"),
         (&["table.csv", "--step", "1", "--columns", "columns.toml"], "columns.toml:1:1: unknown field `colour`"),
     ] {
@@ -429,6 +429,44 @@ fn inspect_solves_a_scene_without_a_grid_as_one_with_it() {
 }
 
 /// Every failure, that of the command line too, is one JSON object where that is asked for.
+#[test]
+fn what_is_no_scene_and_a_place_that_is_not_there_are_told_with_the_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("block.obj", "v 0 0 0\n");
+    write("arm.urdf", "<robot name=\"arm\"/>\n");
+    write("arm", "v 0 0 0\n");
+    for (arguments, expected) in [
+        (
+            ["bake", "block.obj"].as_slice(),
+            "block.obj:1:3: this is no scene, which is TOML: a scene names a mesh in [object.mesh]",
+        ),
+        (&["bake", "arm.urdf"], "`haptize import` makes one of a robot's file"),
+        (&["play", "block.obj"], "not a haptize dataset"),
+        (&["bake", "arm"], "arm:1:3: key with no value"),
+        (&["new", "-o", "none/ball.toml"], "none/ball.toml: cannot be written: none: No such file"),
+    ] {
+        let output = haptize(folder.path(), arguments);
+        let message = text(&output.stderr);
+        assert!(output.status.code() == Some(1) && message.contains(expected), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
+fn an_inspection_in_free_space_names_what_is_nearest() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("finger.toml"), FINGER).unwrap();
+    let inspect = |q: &str| json(folder.path(), &["inspect", "finger.toml", q, "--json"]);
+    let (free, pressed) = (inspect("--q=0.0"), inspect("--q=0.2"));
+    assert!(pressed["clearance"].is_null() && pressed["gap"].as_f64() < Some(0.0), "{pressed}");
+    assert!(free["gap"].as_f64() > Some(0.0) && free["clearance"]["gap"] == free["gap"], "{free}");
+    let told = text(&haptize(folder.path(), &["inspect", "finger.toml", "--q=0.0"]).stdout);
+    assert!(
+        told.contains("  nearest      the least gap is ") && told.contains(" on the object; moving the object by "),
+        "{told}"
+    );
+}
+
 #[test]
 fn every_failure_is_one_json_object() {
     let folder = tempfile::tempdir().unwrap();

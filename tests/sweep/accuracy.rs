@@ -21,7 +21,9 @@ fn sphere(coarser: usize) -> Scene {
 fn errors_fall_with_spacing_and_tolerance() {
     let scene = sphere(2);
     let extent = Extent { configurations: 60, points: 4000, rounds: 1 };
-    let found = accuracy::measure(&scene, extent, &mut |_| ()).unwrap();
+    let mut steps = Vec::new();
+    let found = accuracy::measure(&scene, extent, &mut |step| steps.push(step.to_owned())).unwrap();
+    assert!(steps[0] == "reference" && steps[1].starts_with("the studies take about "), "{steps:?}");
     assert!(found.in_contact > 20 && found.left_out == 0);
     // The reference is far better than anything that is compared with it.
     let least = found.of(Study::Spacing).map(|row| row.rms).fold(f64::INFINITY, f64::min);

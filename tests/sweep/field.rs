@@ -1,5 +1,6 @@
 //! Interpolation of the contact torque, against configurations that were solved and not stored: error, order, energy.
 
+use crate::work::Work;
 use haptize::{
     JointVector,
     contact::{Model, Solver, Status},
@@ -85,8 +86,8 @@ fn potential_makes_no_energy_around_loops_and_linear_does() {
     let (mut worst, mut made) = (0.0_f64, 0.0_f64);
     for _ in 0..20 {
         let path: Vec<JointVector> = (0..4).map(|_| inside(&mut random, &data.grid)).collect();
-        worst = worst.max(potential.work_around(&path).abs());
-        made = made.max(linear.work_around(&path).abs());
+        worst = worst.max(Work(&potential).around(&path).abs());
+        made = made.max(Work(&linear).around(&path).abs());
     }
     assert!(worst < 1e-11 * greatest, "{worst} J of {greatest} J");
     assert!(made > 1e-3 * greatest, "{made} J of {greatest} J");
@@ -94,7 +95,7 @@ fn potential_makes_no_energy_around_loops_and_linear_does() {
     for _ in 0..20 {
         let (from, to) = (inside(&mut random, &data.grid), inside(&mut random, &data.grid));
         let difference = potential.sample(&from).energy - potential.sample(&to).energy;
-        let work = potential.work(&from, &to);
+        let work = Work(&potential).along(&from, &to);
         assert!((work - difference).abs() < 1e-11 * greatest, "{work} J for {difference} J");
     }
 }

@@ -26,3 +26,4 @@ mod resume;
 mod shards;
 mod store;
 mod thin_parts;
+mod work;

@@ -48,7 +48,7 @@ fn solved(scene: &Scene) -> tempfile::TempDir {
 
 fn merged(parts: &Path, output: &Path) -> Result<SweepReport, Error> {
     let merge = Merge::gather(&[parts.to_path_buf()])?;
-    Ok(merge.to_file(output, Some(40), &AtomicBool::new(false), &mut |_| ())?.report)
+    merge.to_file(output, Some(40), &AtomicBool::new(false), &mut |_| ())
 }
 
 /// One bake, and its report.

@@ -2,11 +2,12 @@
 //! force. The first row names each column and its unit; all other entries are numbers, with a point, in the shortest
 //! form that reads back to the same value.
 
-use super::super::{
-    Axis, Dataset, Grid, Stored,
-    error::unwritable,
-    replace_file,
-    stored::{Axes, Description},
+use super::{
+    super::{
+        Axis, Dataset, Grid, Stored,
+        stored::{Axes, Description},
+    },
+    replaced,
 };
 use crate::{
     Error,
@@ -27,16 +28,11 @@ pub(super) fn contacts_file(path: &Path) -> PathBuf {
     path.with_extension("contacts.csv")
 }
 
-pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
-    let mut files = vec![path.to_path_buf()];
+pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<(), Error> {
     if dataset.contacts.is_some() {
-        let contacts = contacts_file(path);
-        replace_file(&contacts, |writer| write_contacts(dataset, writer))
-            .map_err(|source| unwritable(&contacts, &source))?;
-        files.push(contacts);
+        replaced(&contacts_file(path), |writer| write_contacts(dataset, writer))?;
     }
-    replace_file(path, |writer| write_points(dataset, writer)).map_err(|source| unwritable(path, &source))?;
-    Ok(files)
+    replaced(path, |writer| write_points(dataset, writer))
 }
 
 fn write_points(dataset: &Dataset, writer: &mut impl Write) -> io::Result<()> {

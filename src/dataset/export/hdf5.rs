@@ -11,8 +11,8 @@
 //! streams.
 
 use super::{
-    super::{Dataset, error::unwritable, file, replace_file},
-    lines, lines_name,
+    super::{Dataset, file},
+    lines, lines_name, replaced,
 };
 use crate::{Error, memory};
 use hdf5_writer::{AttributeBuilder, ByteOrder, DatasetBuilder, Datatype, Hdf5Builder, Hdf5WritePlan, WriteOptions};
@@ -20,21 +20,20 @@ use safetensors::Dtype;
 use std::{
     collections::BTreeMap,
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
-pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
+pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<(), Error> {
     let bytes: usize = file::arrays(dataset).map(|(_, tensor)| tensor.contents.len()).sum();
     // The dataset itself is there already.
     memory::check(bytes.saturating_mul(2)).map_err(|shortage| {
         Error::at(path, format_args!("{shortage}; or export with --format npz, which takes no memory"))
     })?;
-    let written = plan(dataset)
-        .and_then(|plan| plan.encode(WriteOptions { byte_order: ByteOrder::LittleEndian, ..WriteOptions::default() }))
-        .map_err(io::Error::other)
-        .and_then(|bytes| replace_file(path, |writer| writer.write_all(&bytes)));
-    written.map_err(|source| unwritable(path, &source))?;
-    Ok(vec![path.into()])
+    replaced(path, |writer| {
+        let options = WriteOptions { byte_order: ByteOrder::LittleEndian, ..WriteOptions::default() };
+        let bytes = plan(dataset).and_then(|plan| plan.encode(options)).map_err(io::Error::other)?;
+        writer.write_all(&bytes)
+    })
 }
 
 fn plan(dataset: &Dataset) -> hdf5_writer::Result<Hdf5WritePlan> {

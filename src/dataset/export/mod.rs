@@ -5,9 +5,13 @@ mod hdf5;
 mod npz;
 mod vti;
 
-use super::{Axis, Dataset};
+use super::{Axis, Dataset, error::unwritable, replace_file};
 use crate::Error;
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::{self, BufWriter},
+    path::{Path, PathBuf},
+};
 
 /// Format of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -57,6 +61,11 @@ fn lines(axis: &Axis) -> impl ExactSizeIterator<Item = f64> + '_ {
     (0..axis.count).map(|line| axis.coordinate(line))
 }
 
+/// Replaces the file at `path` by what `write` writes, whole or not at all.
+fn replaced(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>) -> Result<(), Error> {
+    replace_file(path, write).map_err(|source| unwritable(path, &source))
+}
+
 impl Dataset {
     /// Exports the dataset to `path`, replacing it whole or not at all; returns the files written.
     ///
@@ -64,10 +73,12 @@ impl Dataset {
     /// When the system refuses, or the format has no room for so many joints.
     pub fn export(&self, path: &Path, format: Format) -> Result<Vec<PathBuf>, Error> {
         match format {
-            Format::Npz => npz::export(self, path),
+            Format::Npz => replaced(path, |out| npz::write(self, out)),
             Format::Hdf5 => hdf5::export(self, path),
             Format::Csv => csv::export(self, path),
             Format::Vti => vti::export(self, path),
-        }
+        }?;
+        let beside = format.beside(path).filter(|_| self.contacts.is_some());
+        Ok([path.to_path_buf()].into_iter().chain(beside).collect())
     }
 }

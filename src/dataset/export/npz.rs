@@ -6,26 +6,16 @@
 //! not compressed: numbers of a smooth field hardly are.
 
 use super::{
-    super::{Dataset, Stored, error::unwritable, file, replace_file, stored::units},
+    super::{Dataset, Stored, file, stored::units},
     lines, lines_name,
 };
-use crate::Error;
 use npyz::{AutoSerialize, DType, TypeStr, WriterBuilder};
 use safetensors::Dtype;
-use std::{
-    io::{self, Seek, SeekFrom, Write},
-    path::{Path, PathBuf},
-};
+use std::io::{self, Seek, SeekFrom, Write};
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 /// Room for the header of an array beside its data (bytes).
 const ARRAY_HEADER: u64 = 1 << 16;
-
-pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
-    replace_file(path, |writer| write(dataset, ZipWriter::new(Quiet::new(writer))))
-        .map_err(|source| unwritable(path, &source))?;
-    Ok(vec![path.into()])
-}
 
 /// An output that fails once: afterwards nothing is written, and all is well. An archive that is dropped unfinished
 /// would be finished in vain, and `zip` would print so.
@@ -79,8 +69,8 @@ impl<W: Seek> Seek for Quiet<W> {
     }
 }
 
-fn write<W: Write + Seek>(dataset: &Dataset, mut zip: ZipWriter<W>) -> io::Result<()> {
-    let grid = &dataset.grid;
+pub(super) fn write(dataset: &Dataset, out: impl Write + Seek) -> io::Result<()> {
+    let (mut zip, grid) = (ZipWriter::new(Quiet::new(out)), &dataset.grid);
     for (_, tensor) in file::arrays(dataset) {
         let (name, shape) = (tensor.name, &tensor.shape);
         match tensor.dtype {

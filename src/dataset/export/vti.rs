@@ -1,16 +1,16 @@
 //! VTK's image data: torque, energy, gap and status on the grid of two or three joints, whose coordinates are x, y and z.
 
-use super::super::{Dataset, error::unwritable, replace_file};
+use super::{super::Dataset, replaced};
 use crate::{Error, dataset::Axis, vtk};
 use std::{
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 /// Joints that an image has room for.
 const DIMENSIONS: usize = 3;
 
-pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Error> {
+pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<(), Error> {
     let joints = dataset.grid.joints();
     if !(2..=DIMENSIONS).contains(&joints) {
         let what = "VTK's image data have two or three axes";
@@ -19,8 +19,7 @@ pub(super) fn export(dataset: &Dataset, path: &Path) -> Result<Vec<PathBuf>, Err
             format_args!("{what}, and the grid has {joints}: export it as HDF5, which has any number (--format hdf5)"),
         ));
     }
-    replace_file(path, |out| write(dataset, out)).map_err(|source| unwritable(path, &source))?;
-    Ok(vec![path.to_path_buf()])
+    replaced(path, |out| write(dataset, out))
 }
 
 fn write(dataset: &Dataset, out: &mut impl Write) -> io::Result<()> {

@@ -24,6 +24,8 @@ pub struct Nodes {
 pub struct StoredNode {
     /// Level, 0 for the base.
     pub level: u32,
+    /// Its place among the nodes of the level.
+    pub place: Place,
     /// Configuration (rad or m).
     pub q: JointVector,
     /// Torque (N m or N).
@@ -86,10 +88,15 @@ pub struct Block {
     /// Places of nodes whose torque is not to be trusted.
     pub(super) failed: u64,
     /// Numbers of the interpolation at each node less those that the levels below give there, lengths in steps of the
-    /// level.
-    pub(super) surplus: Box<[f32]>,
-    /// The same of the slips, interpolated multilinearly.
-    pub(super) slip_surplus: Box<[f32]>,
+    /// level; and the same of the slips, interpolated multilinearly.
+    surplus: [Box<[f32]>; 2],
+}
+
+/// Which numbers of a block's nodes are asked for.
+#[derive(Clone, Copy)]
+pub(super) enum Numbers {
+    Root,
+    Slip,
 }
 
 impl Block {
@@ -99,27 +106,16 @@ impl Block {
         &self.nodes
     }
 
-    pub(super) fn new(nodes: Nodes, [surplus, slip_surplus]: [Box<[f32]>; 2]) -> Self {
+    pub(super) fn new(nodes: Nodes, surplus: [Box<[f32]>; 2]) -> Self {
         let is_failed = |number: &u8| Status::from_number(*number).is_some_and(Status::is_failed);
         let failed = nodes.places().zip(&nodes.status).filter(|(_, status)| is_failed(status));
-        Self { failed: failed.map(|(place, _)| 1 << place).sum(), nodes, surplus, slip_surplus }
+        Self { failed: failed.map(|(place, _)| 1 << place).sum(), nodes, surplus }
     }
 
-    /// The surplus of the node at `place`, `kinds` numbers; `None` if it was not solved.
+    /// The surplus of the node at `place`, `kinds` numbers; `None` if it was not solved, or has no slip.
     #[inline]
-    pub(super) fn surplus_at(&self, place: usize, kinds: usize) -> Option<&[f32]> {
-        self.row(&self.surplus, place, kinds)
-    }
-
-    /// That of its slip; `None` if it has none.
-    #[inline]
-    pub(super) fn slip_surplus_at(&self, place: usize, kinds: usize) -> Option<&[f32]> {
-        self.row(&self.slip_surplus, place, kinds)
-    }
-
-    #[inline]
-    fn row<'a>(&self, numbers: &'a [f32], place: usize, kinds: usize) -> Option<&'a [f32]> {
-        let present = self.nodes.present;
+    pub(super) fn surplus_at(&self, of: Numbers, place: usize, kinds: usize) -> Option<&[f32]> {
+        let (numbers, present) = (&self.surplus[of as usize], self.nodes.present);
         let rank = (present & ((1 << place) - 1)).count_ones() as usize;
         if present >> place & 1 == 1 { numbers.get(rank * kinds..(rank + 1) * kinds) } else { None }
     }
@@ -128,7 +124,7 @@ impl Block {
     #[must_use]
     pub fn bytes(&self) -> usize {
         let Nodes { records, slips, gap, status, .. } = &self.nodes;
-        let surplus = self.surplus.len() + self.slip_surplus.len();
+        let surplus: usize = self.surplus.iter().map(|numbers| numbers.len()).sum();
         size_of::<Self>() + 4 * (surplus + records.len() + slips.len() + gap.len()) + status.len()
     }
 }

@@ -32,18 +32,18 @@
 use super::{
     Nodes, Space, Store,
     block::{narrowed, widened},
-    record::{slope, width},
+    record::width,
 };
 use crate::{
     Error,
     contact::Status,
     dataset::{
-        Dataset, Grid, Heading, Kind, Provenance, Surface, Tensor, check_place,
+        Dataset, Grid, Heading, Provenance, Surface, Tensor, check_place,
         error::{damaged, inconsistent, no_memory},
         read::Container,
-        surface_tensors, write_container,
+        surface_tensors, write_file,
     },
-    memory::{self, Shortage},
+    memory,
 };
 use serde::{Deserialize, Serialize};
 use std::{path::Path, sync::Arc};
@@ -62,16 +62,6 @@ struct Shape {
 /// How nodes are interpolated.
 const ORDER: &str = "potential";
 
-/// Checks that there is the memory that [`Dataset::refined`] takes for the points of `grid`.
-///
-/// # Errors
-/// [`Shortage`].
-fn check_memory(grid: &Grid) -> Result<(), Shortage> {
-    let row = grid.joints() * size_of::<f64>() + size_of::<f64>() + size_of::<f32>() + size_of::<u8>();
-    let needed = grid.points().saturating_mul(row);
-    if needed > memory::SMALL { memory::check(needed) } else { Ok(()) }
-}
-
 impl Store {
     /// Writes the refined dataset over this store, replacing the file at `path` whole or not at all. Arguments as in
     /// [`Dataset::refined`], of which nothing is made at the points of `grid`.
@@ -87,7 +77,7 @@ impl Store {
         path: &Path,
     ) -> Result<(), Error> {
         check_place(path)?;
-        save(self, Heading { grid, provenance, scene }, surface, path)
+        save(self, Heading { grid, provenance, scene, store: None }, surface, path)
     }
 }
 
@@ -103,25 +93,14 @@ impl Dataset {
         scene: String,
         provenance: Provenance,
     ) -> Self {
-        let (space, points) = (store.space(), grid.points());
-        let (joints, wide) = (space.joints(), width(space.joints()));
+        let (joints, points) = (grid.joints(), grid.points());
         let mut torque = vec![0.0; points * joints];
         let (mut energy, mut gap) = (vec![0.0; points], vec![0.0_f32; points]);
         let mut status = vec![Status::Outside as u8; points];
-        for (key, block) in store.blocks() {
-            // The base comes first.
-            let Some((0, place)) = space.block(key) else { break };
-            let nodes = block.nodes();
-            let there = space.nodes(0, &place).filter(|(at, _)| nodes.present >> at & 1 == 1);
-            for ((row, record), (_, node)) in nodes.records.chunks_exact(wide).enumerate().zip(there) {
-                let point = grid.point(node.map(|k| k as usize));
-                let root = f64::from(record[0]).max(0.0);
-                energy[point] = 0.5 * root * root;
-                (gap[point], status[point]) = (nodes.gap[row], nodes.status[row]);
-                for a in 0..joints {
-                    torque[point * joints + a] = -root * f64::from(record[slope(a)]);
-                }
-            }
+        for node in store.nodes().take_while(|node| node.level == 0) {
+            let point = grid.point(node.place.map(|k| k as usize));
+            torque[point * joints..(point + 1) * joints].copy_from_slice(&node.torque);
+            (energy[point], gap[point], status[point]) = (node.energy, node.gap, node.status);
         }
         Self {
             energy: Some(energy.into()),
@@ -164,15 +143,19 @@ pub(in crate::dataset) fn save(
         tensors.push(Tensor::new::<u16>("node_slips", vec![gap.len(), wide], bytemuck::cast_slice(&slips)));
     }
     tensors.extend(surface.into_iter().flat_map(|surface| surface_tensors(heading.grid, surface)));
-    write_container(path, Kind { format: FORMAT, store: Some(&shape) }, heading, tensors)
+    write_file(path, Heading { store: Some(&shape), ..heading }, tensors)
 }
 
 /// Makes a dataset of a file whose header and checksum are sound.
 pub(in crate::dataset) fn decode(path: &Path, file: Container) -> Result<Dataset, Error> {
     let damaged = |reason: String| damaged(path, reason);
     let (grid, provenance) = file.heading().map_err(damaged)?;
-    // A file of some kilobytes may have a base of gigabytes.
-    check_memory(&grid).map_err(|shortage| no_memory(path, shortage))?;
+    // A file of some kilobytes may have a base of gigabytes, of which a dataset has torque, energy, gap and status.
+    let row = grid.joints() * size_of::<f64>() + size_of::<f64>() + size_of::<f32>() + size_of::<u8>();
+    let needed = grid.points().saturating_mul(row);
+    if needed > memory::SMALL {
+        memory::check(needed).map_err(|shortage| no_memory(path, shortage))?;
+    }
     read(file, grid, provenance).map_err(damaged)
 }
 

@@ -60,9 +60,7 @@ impl Root {
     /// Contact torque, `-dU/dq` where the slopes are the gradient of w: zero at w = 0, without a jump (N m or N).
     #[must_use]
     pub fn torque(&self) -> JointVector {
-        let mut torque = self.slopes;
-        torque.iter_mut().for_each(|slope| *slope *= -self.value.max(0.0));
-        torque
+        self.slopes.scaled(-self.value.max(0.0))
     }
 }
 

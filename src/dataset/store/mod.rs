@@ -34,7 +34,8 @@ pub use block::{Block, Nodes, StoredNode};
 pub(crate) use space::{Cell, weights};
 pub use space::{Place, Space};
 
-use crate::{Error, JointVector, MAX_AXES, dataset::Grid, error};
+use crate::{Error, MAX_AXES, dataset::Grid, error};
+use block::Numbers;
 pub(crate) use block::beyond;
 pub use levels::Root;
 use levels::linear;
@@ -100,23 +101,18 @@ impl Store {
     }
 
     /// All solved nodes, block by block: those of the base first.
-    #[must_use]
-    pub fn nodes(&self) -> Vec<StoredNode> {
-        let (space, width) = (&self.space, record::width(self.space.joints()));
-        let mut all = Vec::new();
-        for (key, block) in self.blocks() {
-            let (Some((level, place)), nodes) = (space.block(key), block.nodes()) else { continue };
-            let own = space.nodes(level, &place).filter(|(place, _)| nodes.present >> place & 1 == 1);
-            for (k, ((_, node), record)) in own.zip(nodes.records.chunks_exact(width)).enumerate() {
+    pub fn nodes(&self) -> impl Iterator<Item = StoredNode> {
+        let (space, wide) = (&self.space, width(self.space.joints()));
+        let blocks = self.blocks().into_iter().filter_map(|(key, block)| Some((space.block(key)?, block.nodes())));
+        blocks.flat_map(move |((level, block), nodes)| {
+            let own = space.nodes(level, &block).filter(|(place, _)| nodes.present >> place & 1 == 1);
+            own.zip(nodes.records.chunks_exact(wide)).enumerate().map(move |(k, ((_, place), record))| {
                 let root = f64::from(record[0]).max(0.0);
-                let q = space.configuration(level, &node);
-                let mut torque = JointVector::zeros(space.joints());
-                torque.iter_mut().enumerate().for_each(|(a, tau)| *tau = -root * f64::from(record[record::slope(a)]));
-                let (energy, gap, status) = (0.5 * root * root, nodes.gap[k], nodes.status[k]);
-                all.push(StoredNode { level, q, torque, energy, gap, status });
-            }
-        }
-        all
+                let torque = (0..space.joints()).map(|a| -root * f64::from(record[slope(a)])).collect();
+                let (q, energy) = (space.configuration(level, &place), 0.5 * root * root);
+                StoredNode { level, place, q, torque, energy, gap: nodes.gap[k], status: nodes.status[k] }
+            })
+        })
     }
 
     /// The blocks on which a block of `level` rests, by level and place: those that hold the corners of the cells of
@@ -218,7 +214,9 @@ impl Store {
             for side in 0..corners {
                 let corner = beyond(&cell.low, side);
                 let Some(block) = self.get(below, &self.space.block_of(&corner)) else { continue };
-                let Some(surplus) = block.surplus_at(self.space.place_of(&corner), wide) else { continue };
+                let Some(surplus) = block.surplus_at(Numbers::Root, self.space.place_of(&corner), wide) else {
+                    continue;
+                };
                 let Some(weights) = kernel::transfer(joints, side, &cell.fractions) else { continue };
                 for ((sum, weights), set) in sum.iter_mut().zip(&weights).zip(sets(joints)) {
                     let scale = f64::from(1_u32 << below).powi(set.count_ones() as i32);
@@ -276,7 +274,7 @@ impl Levels for Store {
     }
 
     fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
-        self.gathered(level, low, numbers, Block::surplus_at)
+        self.gathered(level, low, numbers, Numbers::Root)
     }
 }
 
@@ -296,19 +294,19 @@ impl Levels for Slips<'_> {
     }
 
     fn gather<const C: usize, const W: usize>(&self, level: u32, low: &Place, numbers: &mut [[f64; C]; W]) -> Gathered {
-        self.store.gathered(level, low, numbers, Block::slip_surplus_at)
+        self.store.gathered(level, low, numbers, Numbers::Slip)
     }
 }
 
 impl Store {
-    /// [`Levels::gather`] of the numbers that `surplus_at` gives of a block's node.
+    /// [`Levels::gather`] of the numbers `of` a block's nodes.
     #[inline(always)]
     fn gathered<const C: usize, const W: usize>(
         &self,
         level: u32,
         low: &Place,
         numbers: &mut [[f64; C]; W],
-        surplus_at: impl Fn(&Block, usize, usize) -> Option<&[f32]>,
+        of: Numbers,
     ) -> Gathered {
         let joints = const { C.ilog2() as usize };
         // Corners of a block have bits that agree along odd axes: along these, block and place change from one side to
@@ -337,7 +335,7 @@ impl Store {
         }
         for corner in 0..C {
             let (block, place) = (blocks[corner & odd], (corner ^ odd) & places);
-            match block.and_then(|block| surplus_at(block, place, W)) {
+            match block.and_then(|block| block.surplus_at(of, place, W)) {
                 Some(surplus) => {
                     gathered.any = true;
                     numbers.iter_mut().zip(surplus).for_each(|(number, &surplus)| number[corner] = surplus.into());

@@ -142,12 +142,9 @@ impl Space {
     /// Configuration of a node (rad or m).
     #[must_use]
     pub fn configuration(&self, level: u32, node: &Place) -> crate::JointVector {
-        let mut q = crate::JointVector::zeros(self.joints());
-        for ((q, axis), &node) in q.iter_mut().zip(&self.base.axes).zip(node) {
-            // Steps of the base, which are exact: the same node has the same configuration at every level.
-            *q = axis.start + f64::from(node) / f64::from(1_u32 << level) * axis.step;
-        }
-        q
+        // Steps of the base, which are exact: the same node has the same configuration at every level.
+        let steps = node.map(|node| f64::from(node) / f64::from(1_u32 << level));
+        self.base.axes.iter().zip(steps).map(|(axis, steps)| axis.start + steps * axis.step).collect()
     }
 
     /// Key of a block.

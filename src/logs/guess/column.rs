@@ -12,77 +12,11 @@ pub(super) enum Role {
 }
 
 /// Words for each role, in small letters. A word of the first line makes a column none of the others.
-const OTHERS: &[&str] = &[
-    "velocity",
-    "vel",
-    "speed",
-    "dq",
-    "qd",
-    "acceleration",
-    "acc",
-    "current",
-    "voltage",
-    "temperature",
-    "temp",
-    "stress",
-    "strain",
-    "des",
-    "status",
-    "state",
-    "target",
-    "setpoint",
-    "desired",
-    "reference",
-    "ref",
-    "command",
-    "cmd",
-    "error",
-    "index",
-];
-const TIMES: &[&str] = &["time", "t", "timestamp", "stamp", "clock", "zeit"];
-const TORQUES: &[&str] = &["torque", "tau", "effort", "eff", "trq", "tq", "moment", "force", "f", "load", "motor"];
-const POSITIONS: &[&str] = &[
-    "position",
-    "pos",
-    "angle",
-    "q",
-    "joint",
-    "theta",
-    "phi",
-    "displacement",
-    "disp",
-    "stroke",
-    "encoder",
-    "enc",
-    "depth",
-    "x",
-    "y",
-    "z",
-];
-
-/// Units as logs write them, in small letters without blanks, dots and stars.
-const UNITS: &[(&str, ColumnUnit)] = &[
-    ("rad", ColumnUnit::Radian),
-    ("deg", ColumnUnit::Degree),
-    ("degree", ColumnUnit::Degree),
-    ("degrees", ColumnUnit::Degree),
-    ("°", ColumnUnit::Degree),
-    ("m", ColumnUnit::Metre),
-    ("cm", ColumnUnit::Centimetre),
-    ("mm", ColumnUnit::Millimetre),
-    ("nm", ColumnUnit::NewtonMetre),
-    ("ncm", ColumnUnit::NewtonCentimetre),
-    ("nmm", ColumnUnit::NewtonMillimetre),
-    ("mnm", ColumnUnit::NewtonMillimetre),
-    ("n", ColumnUnit::Newton),
-    ("mn", ColumnUnit::Millinewton),
-    ("s", ColumnUnit::Second),
-    ("sec", ColumnUnit::Second),
-    ("seconds", ColumnUnit::Second),
-    ("ms", ColumnUnit::Millisecond),
-    ("us", ColumnUnit::Microsecond),
-    ("µs", ColumnUnit::Microsecond),
-];
+const OTHERS: &str = "velocity vel speed dq qd acceleration acc current voltage temperature temp stress strain des status \
+                      state target setpoint desired reference ref command cmd error index";
+const TIMES: &str = "time t timestamp stamp clock zeit";
+const TORQUES: &str = "torque tau effort eff trq tq moment force f load motor";
+const POSITIONS: &str = "position pos angle q joint theta phi displacement disp stroke encoder enc depth x y z";
 
 /// A column's name, read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -95,42 +29,40 @@ pub(super) struct Reading {
     pub rest: String,
     /// What stands in brackets and is no unit that is known.
     pub unknown: Option<String>,
-    /// Whether it says that it is something else.
-    pub is_other: bool,
 }
 
 /// Reads the `name` of a column.
 pub(super) fn read(name: &str) -> Reading {
     let (bare, bracketed) = split_brackets(name);
     let mut words = words(bare);
-    let mut unit = bracketed.and_then(unit_of);
+    let mut unit = bracketed.and_then(ColumnUnit::spelt);
     let unknown = bracketed.filter(|text| unit.is_none() && text.chars().any(char::is_alphabetic)).map(str::to_owned);
     if unit.is_none()
         && let Some(last) = words.last()
         // One letter is a name as well.
         && (last.chars().count() > 1 || words.len() > 1)
-        && let Some(found) = unit_of(last)
+        && let Some(found) = ColumnUnit::spelt(last)
     {
         unit = Some(found);
         words.pop();
     }
     let label = words.join(" ");
-    let is_other = words.iter().any(|word| OTHERS.contains(&word.as_str()));
+    let is_of = |all: &str, word: &String| all.split(' ').any(|known| known == word);
+    let is_other = words.iter().any(|word| is_of(OTHERS, word));
     let mut role = None;
     for (words_of, of) in [(TORQUES, Role::Torque), (TIMES, Role::Time), (POSITIONS, Role::Position)] {
-        let is_one = |word: &String| words_of.contains(&word.as_str());
-        if role.is_none() && words.iter().any(is_one) {
+        if role.is_none() && words.iter().any(|word| is_of(words_of, word)) {
             role = Some(of);
-            words.retain(|word| !is_one(word));
+            words.retain(|word| !is_of(words_of, word));
         }
     }
-    let by_unit = unit.map(|unit| match unit.in_si().1 {
+    let by_unit = unit.map(|unit| match unit.si {
         "s" => Role::Time,
         "rad" | "m" => Role::Position,
         _ => Role::Torque,
     });
     let role = if is_other { None } else { by_unit.or(role) };
-    Reading { role, unit, label, rest: words.join(" "), unknown, is_other }
+    Reading { role, unit, label, rest: words.join(" "), unknown }
 }
 
 /// Splits what stands in brackets from a name.
@@ -138,13 +70,6 @@ fn split_brackets(name: &str) -> (&str, Option<&str>) {
     let Some(begin) = name.find(['[', '(']) else { return (name, None) };
     let inside = &name[begin + 1..];
     (&name[..begin], Some(inside.find([']', ')']).map_or(inside, |end| &inside[..end])))
-}
-
-/// The unit that `text` names.
-fn unit_of(text: &str) -> Option<ColumnUnit> {
-    let text: String = text.chars().filter(|c| !matches!(c, ' ' | '.' | '*' | '·' | '-')).collect();
-    let text = text.to_lowercase();
-    UNITS.iter().find(|(name, _)| *name == text).map(|(_, unit)| *unit)
 }
 
 /// The words of a name, in small letters; digits behind a word are one of their own.
@@ -167,9 +92,9 @@ mod tests {
     fn names_say_what_a_column_is_and_of_which_joint() {
         let of = |name: &str| {
             let Reading { role, unit, rest, .. } = read(name);
-            (role, unit.map(ColumnUnit::in_si), rest)
+            (role, unit.map(|unit| (unit.factor, unit.si)), rest)
         };
-        let degree = Some(ColumnUnit::Degree.in_si());
+        let degree = Some((std::f64::consts::PI / 180.0, "rad"));
         assert_eq!(of("q1"), (Some(Role::Position), None, "1".into()));
         assert_eq!(of("tau_2"), (Some(Role::Torque), None, "2".into()));
         assert_eq!(of("elbow angle [deg]"), (Some(Role::Position), degree, "elbow".into()));
@@ -180,7 +105,7 @@ mod tests {
         assert_eq!(of("x [N]"), (Some(Role::Torque), Some((1.0, "N")), String::new()));
         assert_eq!(of("displacement_mm"), (Some(Role::Position), Some((1e-3, "m")), String::new()));
         for other in ["velocity [rad/s]", "q_target", "stress_kPa", "index"] {
-            assert!(read(other).is_other, "{other}");
+            assert_eq!(read(other).role, None, "{other}");
         }
         assert_eq!(of("m"), (None, None, "m".into()));
     }

@@ -75,6 +75,13 @@ struct GuessedColumn {
     values: Vec<f64>,
 }
 
+impl GuessedColumn {
+    fn new(layout: &Layout, column: usize, unit: Option<ColumnUnit>) -> Self {
+        let factor = unit.map_or(1.0, |unit| unit.factor);
+        Self { column, unit, values: layout.columns[column].iter().map(|value| factor * value).collect() }
+    }
+}
+
 struct GuessedJoint {
     name: String,
     position: GuessedColumn,
@@ -113,7 +120,7 @@ pub fn guess(log: &Path) -> Result<GuessedMapping, Error> {
     let pairs = pairs(&readings, &positions, &torques, &mut doubts);
     let joints: Vec<GuessedJoint> =
         pairs.into_iter().map(|pair| joint(&layout, &readings, pair, &mut doubts)).collect();
-    let (joints, still): (Vec<GuessedJoint>, Vec<GuessedJoint>) =
+    let (mut joints, still): (Vec<GuessedJoint>, Vec<GuessedJoint>) =
         joints.into_iter().partition(|joint| range(&joint.position.values).is_some_and(|[low, high]| high > low));
     if !still.is_empty() {
         let names: Vec<&str> = still.iter().map(|joint| joint.name.as_str()).collect();
@@ -123,13 +130,15 @@ pub fn guess(log: &Path) -> Result<GuessedMapping, Error> {
         return Err(Error::at(log, format_args!("no joint moves in its rows: {}", described(&layout))));
     }
     let mut known = HashSet::new();
-    let named = joints.iter().all(|joint| known.insert(joint.name.as_str()));
+    if !joints.iter().all(|joint| known.insert(joint.name.clone())) {
+        joints.iter_mut().enumerate().for_each(|(k, joint)| joint.name = format!("joint {}", k + 1));
+    }
     let rising = times.iter().find(|column| rises(&layout.columns[**column]) >= RISING);
     let time = rising.map(|column| time(&layout, &readings, *column, &mut doubts));
     if time.is_none() {
         doubts.push("no column is the time: rows are taken to be 1 ms apart".to_owned());
     }
-    let facts = MappingFacts { layout: &layout, time, joints, named, effort: Effort::Contact, average: None };
+    let facts = MappingFacts { layout: &layout, time, joints, effort: Effort::Contact, average: None };
     Ok(facts.complete(log, doubts))
 }
 
@@ -242,27 +251,24 @@ fn joint(layout: &Layout, readings: &[Reading], pair: (usize, usize), doubts: &m
     }
     let turns = turns && readings[position].unknown.is_none();
     let unit = readings[position].unit.or_else(|| {
-        let unit = if turns { ColumnUnit::Degree } else { ColumnUnit::Radian };
-        doubts.push(format!("{name}: the position is taken to be in {}", unit.name()));
-        Some(unit)
+        let unit = if turns { "deg" } else { "rad" };
+        doubts.push(format!("{name}: the position is taken to be in {unit}"));
+        ColumnUnit::named(unit)
     });
-    let slides = unit.is_some_and(|unit| unit.in_si().1 == "m");
+    let slides = unit.is_some_and(|unit| unit.si == "m");
     let unit_of_torque = readings[torque].unit.or_else(|| {
-        let unit = if slides { ColumnUnit::Newton } else { ColumnUnit::NewtonMetre };
-        doubts.push(format!("{name}: the torque is taken to be in {}", unit.name()));
-        Some(unit)
+        let unit = if slides { "N" } else { "N m" };
+        doubts.push(format!("{name}: the torque is taken to be in {unit}"));
+        ColumnUnit::named(unit)
     });
-    let is_force = unit_of_torque.is_some_and(|unit| unit.in_si().1 == "N");
+    let is_force = unit_of_torque.is_some_and(|unit| unit.si == "N");
     if is_force != slides {
         let other = if slides { "a sliding joint has a force in N" } else { "a turning joint has a torque in N m" };
         doubts.push(format!("{name}: {other}: multiply by the lever by `scale`, or take another column"));
     }
-    let quantity = |column: usize, unit: Option<ColumnUnit>| {
-        let factor = unit.map_or(1.0, |unit| unit.in_si().0);
-        GuessedColumn { column, unit, values: layout.columns[column].iter().map(|value| factor * value).collect() }
-    };
     let of_motor = readings[torque].label.contains("motor");
-    GuessedJoint { position: quantity(position, unit), torque: quantity(torque, unit_of_torque), of_motor, name }
+    let position = GuessedColumn::new(layout, position, unit);
+    GuessedJoint { name, position, torque: GuessedColumn::new(layout, torque, unit_of_torque), of_motor }
 }
 
 /// The column of time, in seconds.
@@ -272,12 +278,11 @@ fn time(layout: &Layout, readings: &[Reading], column: usize, doubts: &mut Vec<S
         let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
         steps.sort_unstable_by(f64::total_cmp);
         let period = steps.get(steps.len() / 2).copied().unwrap_or_default();
-        let unit = if period >= LONGEST_PERIOD { ColumnUnit::Millisecond } else { ColumnUnit::Second };
-        doubts.push(format!("the time is taken to be in {}: rows are {} apart", unit.name(), coarse(period)));
-        Some(unit)
+        let unit = if period >= LONGEST_PERIOD { "ms" } else { "s" };
+        doubts.push(format!("the time is taken to be in {unit}: rows are {} apart", coarse(period)));
+        ColumnUnit::named(unit)
     });
-    let factor = unit.map_or(1.0, |unit| unit.in_si().0);
-    GuessedColumn { column, unit, values: values.iter().map(|value| factor * value).collect() }
+    GuessedColumn::new(layout, column, unit)
 }
 
 /// What is written.
@@ -285,8 +290,6 @@ struct MappingFacts<'a> {
     layout: &'a Layout,
     time: Option<GuessedColumn>,
     joints: Vec<GuessedJoint>,
-    /// Whether no two joints have one name.
-    named: bool,
     effort: Effort,
     /// Speed of the first joint below which it stands still, and the sides of the cells, where rows are averaged.
     average: Option<(f64, Vec<f64>)>,
@@ -294,17 +297,13 @@ struct MappingFacts<'a> {
 
 impl MappingFacts<'_> {
     fn complete(mut self, log: &Path, mut doubts: Vec<String>) -> GuessedMapping {
-        if !self.named {
-            self.joints.iter_mut().enumerate().for_each(|(k, joint)| joint.name = format!("joint {}", k + 1));
-        }
         let ranges: Vec<f64> = self
             .joints
             .iter()
             .map(|joint| range(&joint.position.values).map_or(0.0, |[low, high]| high - low))
             .collect();
         let pulls = pull(self.joints.iter().map(|joint| (&joint.position.values[..], &joint.torque.values[..])));
-        let is_named = self.joints.iter().any(|joint| joint.of_motor);
-        if pulls > 0.0 || is_named {
+        if pulls > 0.0 || self.joints.iter().any(|joint| joint.of_motor) {
             self.effort = Effort::Motor;
         }
         doubts.push(match self.effort {
@@ -364,12 +363,12 @@ impl MappingFacts<'_> {
             _ => (column + 1).to_string(),
         };
         let unit =
-            |unit: Option<ColumnUnit>| unit.map_or(String::new(), |unit| format!(", unit = {}", quoted(unit.name())));
+            |unit: Option<ColumnUnit>| unit.map_or(String::new(), |unit| format!(", unit = {}", quoted(unit.name)));
         writeln!(text, "\n[time]")?;
         match time {
             Some(time) => {
                 writeln!(text, "column = {}", column(time.column))?;
-                time.unit.iter().try_for_each(|unit| writeln!(text, "unit = {}", quoted(unit.name())))?;
+                time.unit.iter().try_for_each(|unit| writeln!(text, "unit = {}", quoted(unit.name)))?;
             }
             None => writeln!(text, "period = {PERIOD}    # [s]")?,
         }

@@ -85,7 +85,9 @@ impl<'a> Elements<'a> {
     /// Refuses nodes that are not there.
     fn check(&self, nodes: &[u32]) -> Result<(), String> {
         match nodes.iter().find(|node| **node as usize >= self.nodes.len()) {
-            Some(node) => Err(format!("there is no node {node}, counted from 0, of {}", self.nodes.len())),
+            Some(node) => {
+                Err(format!("there is no node {node}, counted from 0, of {}: export the mesh again", self.nodes.len()))
+            }
             None => Ok(()),
         }
     }

@@ -18,6 +18,9 @@ const INT: NumberType = NumberType::I32;
 const SIZE: NumberType = NumberType::U64;
 const REAL: NumberType = NumberType::F64;
 
+/// Refuses another version; the first one begins with its nodes.
+const VERSIONS: &str = "only versions 2.2 and 4.1 are read (gmsh -format msh41)";
+
 /// Bytes of a `size_t` and of a `double`.
 const DATA_SIZE: u64 = 8;
 
@@ -47,6 +50,7 @@ pub(super) fn read(bytes: &[u8], elements: &mut Elements<'_>) -> Result<(), Stri
         let end = format!("$End{name}");
         match (name, format) {
             ("MeshFormat", _) => format = Some(reader.format()?),
+            ("NOD", None) => return refuse(VERSIONS),
             ("Nodes" | "ParametricNodes" | "Entities" | "PartitionedEntities" | "Elements", None) => {
                 return refuse(&format!("${name} comes before $MeshFormat"));
             }
@@ -101,7 +105,7 @@ impl Reader<'_, '_, '_> {
         let version = match version {
             2.2 => Version::Two,
             4.1 => Version::Four,
-            _ => return Err(file.error("only versions 2.2 and 4.1 are read (gmsh -format msh41)")),
+            _ => return Err(file.error(VERSIONS)),
         };
         file.end_record();
         if is_binary == 0 {
@@ -292,7 +296,9 @@ impl Reader<'_, '_, '_> {
         for _ in 0..cell.nodes.unwrap_or(0) {
             let tag = self.count(of)?;
             let node = self.tags.get(&tag).copied();
-            nodes.push(node.ok_or_else(|| self.file.error(format_args!("there is no node {tag}")))?);
+            nodes.push(
+                node.ok_or_else(|| self.file.error(format_args!("there is no node {tag}: save the mesh again")))?,
+            );
         }
         if self.file.end_record() {
             return Err(self.file.error(format_args!("an element of type {kind} must have {} nodes", nodes.len())));

@@ -36,7 +36,7 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
             node_number(positions.len())?;
         } else {
             let corners: Option<Vec<u32>> = words.map(|word| corner(word, positions.len())).collect();
-            let corners = corners.ok_or_else(|| bad("a face has numbers of vertices"))?;
+            let corners = corners.ok_or_else(|| bad("a face has numbers of vertices, counted from 1"))?;
             if corners.len() < 3 {
                 return Err(bad("a face has at least three corners"));
             }
@@ -51,7 +51,10 @@ pub(super) fn read(stream: &mut impl Read) -> Result<Surface, String> {
     for (line, face) in faces {
         if let Some(corner) = face.iter().find(|corner| **corner as usize >= positions.len()) {
             let number = u64::from(*corner) + 1;
-            return Err(format!("line {line}: a face names vertex {number}, of {}", positions.len()));
+            return Err(format!(
+                "line {line}: a face names vertex {number}, of {}: export the mesh again",
+                positions.len()
+            ));
         }
         triangles.extend(polygon::cut(&face, &positions).map_err(|reason| format!("line {line}: {reason}"))?);
     }

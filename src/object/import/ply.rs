@@ -142,7 +142,7 @@ fn binary_element(stream: &mut impl Read, element: &ElementDef, encoding: Encodi
         if read as u64 == length {
             Ok(bytes[start..].to_vec())
         } else {
-            Err(format!("it ends within a {}", element.name))
+            Err(format!("it ends within a {}: it was cut off; export the mesh again", element.name))
         }
     };
     for property in element.properties.values() {

@@ -13,7 +13,7 @@ use std::collections::{HashMap, HashSet};
 /// Why the face has no triangles, and what to do.
 pub(super) fn cut(face: &[u32], nodes: &[DVec3]) -> Result<Vec<[u32; 3]>, String> {
     if let Some(node) = face.iter().find(|node| **node as usize >= nodes.len()) {
-        return Err(format!("a face names node {node}, counted from 0, of {}", nodes.len()));
+        return Err(format!("a face names node {node}, counted from 0, of {}: export the mesh again", nodes.len()));
     }
     let place = |corner: u32| nodes[corner as usize];
     match face {

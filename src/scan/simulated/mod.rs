@@ -76,10 +76,15 @@ impl SimulatedRig {
         self
     }
 
-    /// Contact nodes that touch the block now.
+    /// Returns a description for logs, one line.
     #[must_use]
-    pub fn touching(&self) -> usize {
-        self.contacts.iter().filter(|contact| contact.touches()).count()
+    pub fn description(&self) -> String {
+        let (size, is_bare) = (1e3 * self.spec.size, self.spec.cover == Cover::Bare);
+        let cover = if is_bare { "bare" } else { "covered with fabric" };
+        format!(
+            "SIMULATED rig: a spongy block of {:.0} x {:.0} x {:.0} mm, {cover}; no real object was touched",
+            size.x, size.y, size.z
+        )
     }
 
     fn step(&mut self, torque: &JointVector, time: f64) {
@@ -95,11 +100,9 @@ impl SimulatedRig {
             hand.add_torque(self.time, &self.position, &self.velocity, &mut load);
         }
         let inertia = self.chain.inertia(&self.pose);
-        let mut rate = JointVector::zeros(self.position.len());
-        for (joint, rate) in rate.iter_mut().enumerate() {
-            let viscous = VISCOUS * inertia[joint][joint] * self.velocity[joint];
-            *rate = torque[joint] + load[joint] - viscous;
-        }
+        let viscous = |joint: usize| VISCOUS * inertia[joint][joint] * self.velocity[joint];
+        let joints = 0..self.position.len();
+        let mut rate = joints.map(|joint| torque[joint] + load[joint] - viscous(joint)).collect();
         solve_positive(&inertia, &mut rate);
         for joint in 0..rate.len() {
             let free = self.velocity[joint] + time * rate[joint];
@@ -133,18 +136,13 @@ impl SimulatedRig {
 impl Device for SimulatedRig {
     fn read(&mut self, elapsed: f64) -> Reading {
         if elapsed > 0.0 {
-            let mut actual = self.torque;
-            for value in actual.iter_mut() {
-                *value += self.spec.noise * self.noise.normal();
-            }
+            let mut noisy = |torque: &f64| torque + self.spec.noise * self.noise.normal();
+            let actual = self.torque.iter().map(&mut noisy).collect();
             for _ in 0..STEPS {
                 self.step(&actual, elapsed / STEPS as f64);
             }
         }
-        let mut position = self.position;
-        for (joint, value) in position.iter_mut().enumerate() {
-            *value = self.encoded(joint);
-        }
+        let position = (0..self.position.len()).map(|joint| self.encoded(joint)).collect();
         let held = self.hand.as_ref().is_some_and(|hand| hand.holds(self.time));
         Reading { held, ..Reading::at(position) }
     }
@@ -156,23 +154,5 @@ impl Device for SimulatedRig {
         }
         self.torque = JointVector::zeros(torque.len());
         Applied { halt: Some(Halt::NotFinite), ..Applied::whole(&self.torque) }
-    }
-}
-
-impl SimulatedRig {
-    /// Returns a description for logs, one line.
-    #[must_use]
-    pub fn description(&self) -> String {
-        let SpecimenSpec { size, cover, .. } = &self.spec;
-        let cover = match cover {
-            Cover::Bare => "bare",
-            Cover::Fabric => "covered with fabric",
-        };
-        format!(
-            "SIMULATED rig: a spongy block of {:.0} x {:.0} x {:.0} mm, {cover}; no real object was touched",
-            size.x * 1e3,
-            size.y * 1e3,
-            size.z * 1e3
-        )
     }
 }

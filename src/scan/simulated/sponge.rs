@@ -76,14 +76,6 @@ struct Face {
     upper: bool,
 }
 
-impl NodeContact {
-    /// Whether the node touches the block.
-    #[must_use]
-    pub fn touches(&self) -> bool {
-        self.face.is_some()
-    }
-}
-
 impl Face {
     fn normal(self) -> DVec3 {
         let mut normal = DVec3::ZERO;

@@ -28,13 +28,8 @@ fn field(scene: &Scene, dataset: &Dataset, interpolation: Interpolation) -> Resu
     TorqueField::interpolated(dataset, interpolation, spec.threshold, &spec.boundary_slope)
 }
 
-/// Errors at all spacings with at most `limit` grid points; the dataset of the scene's own.
-pub(super) fn spacing(
-    scene: &Scene,
-    reference: &Reference,
-    limit: usize,
-    study: &mut Accuracy,
-) -> Result<Dataset, Error> {
+/// The scene on grids of all spacings with at most `limit` points; the others are noted in `study`.
+pub(super) fn spacings(scene: &Scene, limit: usize, study: &mut Accuracy) -> Vec<Scene> {
     let mut grids: Vec<Scene> = Vec::new();
     for coarser in COARSER {
         let spaced = spaced(scene, |steps| (steps / coarser).round());
@@ -51,6 +46,11 @@ pub(super) fn spacing(
         }
         grids.push(spaced);
     }
+    grids
+}
+
+/// Errors on `grids`; the dataset of the scene's own.
+pub(super) fn spacing(grids: &[Scene], reference: &Reference, study: &mut Accuracy) -> Result<Dataset, Error> {
     let mut bakes = in_turns(study.rounds, grids.len(), |k| baked(&grids[k]))?;
     let own = grids.iter().position(|grid| points(grid) == study.points).unwrap_or(0);
     let own_time = bakes[own].0;

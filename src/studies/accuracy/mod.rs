@@ -22,11 +22,17 @@ pub use report::{FILES, write_all};
 use crate::{
     Error,
     contact::Model,
+    names::duration,
     proxy::Chain,
-    scene::{JointKind, NormUnit, Scene},
-    sweep::{build_object, reference::Reference, sample, spacing},
+    scene::{ContactLaw, JointKind, NormUnit, Scene},
+    sweep::{
+        build_object,
+        reference::{Reference, equilibria},
+        sample, spacing,
+    },
 };
 use serde::Serialize;
+use settings::Variant;
 use std::time::Instant;
 
 /// Seed of the reference's configurations.
@@ -135,11 +141,15 @@ pub struct Extent {
 /// # Errors
 /// Any [`Error`].
 pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) -> Result<Accuracy, Error> {
+    let begun = Instant::now();
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
     let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
+    let build = begun.elapsed().as_secs_f64();
     progress("reference");
     let reference = Reference::solve(scene, &model, SEED, extent.configurations)?;
+    let (following, reference_error) = timed(|| reference.own_error(scene, &model))?;
+    let (own, _) = timed(|| equilibria(&model, scene.contact, &reference.places))?;
     let mut study = Accuracy {
         scene: scene.name.clone(),
         rounds: extent.rounds,
@@ -148,7 +158,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
         left_out: reference.left_out,
         norm: reference.norm.unit,
         torque: reference.torque,
-        reference_error: reference.own_error(scene, &model)?,
+        reference_error,
         joints: chain.joints.len(),
         interpolation: scene.haptics.interpolation.name(),
         points: spacing::points(scene),
@@ -158,14 +168,48 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
         rows: Vec::new(),
         notes: Vec::new(),
     };
+    let grids = grids::spacings(scene, extent.points, &mut study);
+    let variants = settings::variants(scene, &mut study)?;
+    let times = Times { build, own, following, configurations: reference.exact.len() };
+    progress(&format!("the studies take about {}", duration(times.forecast(extent.rounds, scene, &grids, &variants))));
     progress("grid spacing and interpolation");
-    let own = grids::spacing(scene, &reference, extent.points, &mut study)?;
+    let own = grids::spacing(&grids, &reference, &mut study)?;
     progress("look-up and live contact");
     grids::look_up(scene, &own, &mut study)?;
     live::live(scene, &model, &reference, &mut study);
     progress("contact solver, mesh, contact nodes, skin, contact stiffness");
-    settings::studies(scene, &reference, &mut study)?;
+    for (varied, variants) in &variants {
+        settings::compare(scene, *varied, variants, &reference, &mut study)?;
+    }
     Ok(study)
+}
+
+/// Times that were taken with the reference, and tell those of the studies (s).
+struct Times {
+    /// Building the scene's object and its model.
+    build: f64,
+    /// Solving all `configurations` as the scene does.
+    own: f64,
+    /// The same by the law that follows, to the reference's tolerance.
+    following: f64,
+    configurations: usize,
+}
+
+impl Times {
+    /// Time of the studies, where other bodies take as long to build as the scene's own, and points of a grid as long to
+    /// solve as random configurations (s).
+    fn forecast(&self, rounds: usize, own: &Scene, grids: &[Scene], variants: &[(Study, Vec<Variant>)]) -> f64 {
+        let rounds = rounds as f64;
+        let solved = |scene: &Scene| match scene.contact.law {
+            ContactLaw::Following => self.following,
+            ContactLaw::Rest => self.own,
+        };
+        let point = self.own / self.configurations as f64;
+        let bakes: f64 = grids.iter().map(|grid| rounds * (self.build + point * spacing::points(grid) as f64)).sum();
+        let scenes =
+            variants.iter().flat_map(|(_, variants)| variants.iter().map(|variant| &variant.scene).chain([own]));
+        bakes + scenes.map(|scene| self.build + rounds * solved(scene)).sum::<f64>()
+    }
 }
 
 /// Unit of the scene's joints.
@@ -178,6 +222,12 @@ fn unit(scene: &Scene) -> &'static str {
     }
 }
 
+/// Time of `work` (s) and its result.
+fn timed<T, E>(work: impl FnOnce() -> Result<T, E>) -> Result<(f64, T), E> {
+    let start = Instant::now();
+    work().map(|result| (start.elapsed().as_secs_f64(), result))
+}
+
 /// Least time of `rounds` runs, at least one, of each of `count` kinds of work (s), and the last result. They take
 /// turns, to and fro: what else a busy machine does falls on all alike.
 fn in_turns<T, E>(
@@ -185,10 +235,7 @@ fn in_turns<T, E>(
     count: usize,
     mut work: impl FnMut(usize) -> Result<T, E>,
 ) -> Result<Vec<(f64, T)>, E> {
-    let mut run = |kind: usize| {
-        let start = Instant::now();
-        work(kind).map(|result| (start.elapsed().as_secs_f64(), result))
-    };
+    let mut run = |kind: usize| timed(|| work(kind));
     let mut least: Vec<(f64, T)> = (0..count).map(&mut run).collect::<Result<_, E>>()?;
     for round in 1..rounds {
         for step in 0..count {
@@ -198,4 +245,28 @@ fn in_turns<T, E>(
         }
     }
     Ok(least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_studies_take_their_grids_and_variants_as_often_as_they_are_timed() {
+        let scene = Scene::parse(include_str!("../../../tests/scenes/small.toml"), "small.toml").unwrap();
+        let by = |law| {
+            let mut scene = scene.clone();
+            scene.contact = scene.contact.by(law);
+            scene
+        };
+        let variant = |law| Variant { scene: by(law), series: "", setting: String::new(), value: 1.0 };
+        let times = Times { build: 3.0, own: 5.0, following: 70.0, configurations: 10 };
+        let variants = [(Study::Law, vec![variant(ContactLaw::Following), variant(ContactLaw::Rest)])];
+        let grid = 3.0 + 0.5 * spacing::points(&scene) as f64;
+        let own = by(ContactLaw::Rest);
+        // Both laws and the scene's own, built once.
+        let forecast = |rounds, grids: &[Scene]| times.forecast(rounds, &own, grids, &variants);
+        assert!((forecast(1, &[]) - (9.0 + 80.0)).abs() < 1e-9);
+        assert!((forecast(2, &[own.clone(), own.clone()]) - (9.0 + 160.0 + 4.0 * grid)).abs() < 1e-9);
+    }
 }

@@ -34,15 +34,15 @@ const SOFTER: [f64; 4] = [4.0, 1.0, 0.25, 0.0625];
 const LEAST_RING: usize = 4;
 
 /// The scene with one setting changed.
-struct Variant {
-    scene: Scene,
-    series: &'static str,
-    setting: String,
-    value: f64,
+pub(super) struct Variant {
+    pub(super) scene: Scene,
+    pub(super) series: &'static str,
+    pub(super) setting: String,
+    pub(super) value: f64,
 }
 
-/// All studies that the scene allows.
-pub(super) fn studies(scene: &Scene, reference: &Reference, study: &mut Accuracy) -> Result<(), Error> {
+/// What is varied in all studies that the scene allows; of the others `study` notes why.
+pub(super) fn variants(scene: &Scene, study: &mut Accuracy) -> Result<Vec<(Study, Vec<Variant>)>, Error> {
     let studies = [
         (Study::Tolerance, tolerances(scene), ""),
         (Study::Law, laws(scene), ""),
@@ -51,18 +51,19 @@ pub(super) fn studies(scene: &Scene, reference: &Reference, study: &mut Accuracy
         (Study::Skin, skins(scene), "the object has no skin whose bending stiffness could be varied"),
         (Study::Stiffness, stiffnesses(scene)?, "contact stiffness is not varied: contact is rigid"),
     ];
+    let mut possible = Vec::new();
     for (varied, variants, note) in studies {
         if variants.len() < 2 {
             study.notes.push(note.to_owned());
-            continue;
+        } else {
+            possible.push((varied, variants));
         }
-        compare(scene, varied, &variants, reference, study)?;
     }
-    Ok(())
+    Ok(possible)
 }
 
 /// Rows of `variants`, which take turns with the scene as it is.
-fn compare(
+pub(super) fn compare(
     own: &Scene,
     varied: Study,
     variants: &[Variant],

@@ -205,7 +205,7 @@ impl<B: Backend> Filling<'_, B> {
         let corners = 1_usize << self.book.nodes.space.joints();
         let solved = (0..corners).filter_map(|set| self.book.nodes.get(0, &beyond(low, set)));
         let zero = JointVector::zeros(self.book.nodes.space.joints());
-        let squares = solved.map(|held| self.norm.square(&held.node.result.torque, &zero));
+        let squares = solved.map(|held| self.norm.square(&held.result.torque, &zero));
         (squares.sum::<f64>() / corners as f64).sqrt()
     }
 
@@ -214,11 +214,11 @@ impl<B: Backend> Filling<'_, B> {
     fn square(&self, store: &Store, level: u32, node: &Place) -> f64 {
         let nodes = &self.book.nodes;
         let Some(held) = nodes.get(level, node) else { return 0.0 };
-        if !matches!(held.node.result.status, Status::Free | Status::Contact) {
+        if !matches!(held.result.status, Status::Free | Status::Contact) {
             return 0.0;
         }
         let torque = store.sample(&nodes.space.configuration(level, node)).torque();
-        self.norm.square(&torque, &held.node.result.torque)
+        self.norm.square(&torque, &held.result.torque)
     }
 
     /// Solves those of `nodes` of `level` that are not, and compares `store` with them.
@@ -344,7 +344,7 @@ fn publish(store: &mut Store, held: &HeldNodes, level: u32, nodes: &BTreeSet<Pla
     for ((at, block), published) in &mut blocks {
         for (place, node) in space.nodes(*at, block).filter(|(_, node)| *at == level && nodes.contains(node)) {
             if let Some(held) = held.get(level, &node) {
-                let Solved { record, slip, result, .. } = &held.node;
+                let Solved { record, slip, result, .. } = held;
                 published.push(place, record, slip, result.gap, result.status);
             }
         }

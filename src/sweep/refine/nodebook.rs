@@ -28,37 +28,24 @@ use std::{
 /// Level and place of a node.
 pub(super) type Point = (u32, Place);
 
-/// A node that is solved.
-pub(super) struct Held {
-    pub node: Solved,
-    /// Contact forces on the object's nodes, ascending by node (N).
-    forces: Vec<(u32, Vec3)>,
-}
-
 /// Memory of a node that is held, with so many numbers and forces on `forces` nodes of the object (bytes).
 pub(super) fn held_bytes(numbers: usize, forces: f64) -> f64 {
-    let fixed = size_of::<(Point, Held)>() + numbers * size_of::<f32>();
+    let fixed = size_of::<(Point, Solved)>() + numbers * size_of::<f32>();
     // Tables grow by doubling.
     2.0 * fixed as f64 + forces * size_of::<(u32, Vec3)>() as f64
-}
-
-impl Held {
-    fn new(node: Solved, here: &Equilibrium) -> Self {
-        Self { node, forces: here.forces.iter().map(|on| (on.node, on.force.as_vec3())).collect() }
-    }
 }
 
 /// All nodes that are solved.
 pub(super) struct HeldNodes {
     pub space: Space,
     scale: Scale,
-    held: HashMap<Point, Held>,
+    held: HashMap<Point, Solved>,
     /// Status and energy from rest of those that were lowered (J).
     from_rest: HashMap<Point, (Status, f64)>,
 }
 
 impl HeldNodes {
-    pub fn get(&self, level: u32, place: &Place) -> Option<&Held> {
+    pub fn get(&self, level: u32, place: &Place) -> Option<&Solved> {
         self.held.get(&(level, *place))
     }
 
@@ -68,7 +55,7 @@ impl HeldNodes {
 
     /// Returns the number of equilibria that were solved in contact for these nodes, searches for lower ones aside.
     pub fn equilibria(&self) -> usize {
-        self.held.values().map(|held| held.node.equilibria as usize).sum()
+        self.held.values().map(|held| held.equilibria as usize).sum()
     }
 
     /// Returns the corners of the finest cell around `q` that are all solved, with its spacing along each axis [rad or
@@ -84,15 +71,13 @@ impl HeldNodes {
     }
 
     fn spacing(&self, level: u32) -> JointVector {
-        let mut spacing = JointVector::zeros(self.space.joints());
-        spacing.iter_mut().enumerate().for_each(|(a, step)| *step = self.space.step(level, a));
-        spacing
+        (0..self.space.joints()).map(|a| self.space.step(level, a)).collect()
     }
 }
 
 impl Lattice for HeldNodes {
     type Point = Point;
-    type Row = Held;
+    type Row = Solved;
 
     fn configuration(&self, (level, place): Point) -> JointVector {
         self.space.configuration(level, &place)
@@ -116,12 +101,12 @@ impl Lattice for HeldNodes {
     }
 
     fn status(&self, point: Point) -> Status {
-        self.held.get(&point).map_or(Status::Outside, |held| held.node.result.status)
+        self.held.get(&point).map_or(Status::Outside, |held| held.result.status)
     }
 
     fn result(&self, point: Point) -> PointResult {
         let unknown = || PointResult::of(&Equilibrium::free(0.0, self.space.joints()));
-        self.held.get(&point).map_or_else(unknown, |held| held.node.result)
+        self.held.get(&point).map_or_else(unknown, |held| held.result)
     }
 
     fn forces(&self, point: Point) -> Vec<NodeForce> {
@@ -129,14 +114,14 @@ impl Lattice for HeldNodes {
         forces.iter().map(|&(node, force)| NodeForce { node, force: force.as_dvec3() }).collect()
     }
 
-    fn row(&self, solver: &mut Solver<'_>, q: &JointVector, found: &Equilibrium) -> Held {
-        Held::new(holding(solver, q, found, &self.scale), found)
+    fn row(&self, solver: &mut Solver<'_>, q: &JointVector, found: &Equilibrium) -> Solved {
+        holding(solver, q, found, &self.scale)
     }
 
-    fn replace(&mut self, found: BTreeMap<Point, Held>) {
+    fn replace(&mut self, found: BTreeMap<Point, Solved>) {
         for (point, row) in found {
             if let Some(before) = self.held.insert(point, row) {
-                let PointResult { status, energy, .. } = before.node.result;
+                let PointResult { status, energy, .. } = before.result;
                 self.from_rest.entry(point).or_insert((status, energy));
             }
         }
@@ -186,7 +171,7 @@ impl<'a, B: Backend> Nodebook<'a, B> {
             let notices = backend.notices().into_iter();
             self.notices.extend(notices.map(|notice| format!("from the store's node {first} on: {notice}")));
             let points = places.iter().map(|place| (level, *place));
-            nodes.held.extend(points.zip(solved.into_iter().map(|(node, here)| Held::new(node, &here))));
+            nodes.held.extend(points.zip(solved));
         }
         self.lower(&wanted.into_iter().map(|place| (level, place)).collect());
         Ok(())

@@ -18,6 +18,7 @@ const PLAIN: &str = r#"<robot name="plain">
 /// have.
 const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("</robot>", "", 1, &["not well-formed XML"]),
+    ("<robot name=\"plain\">", "name = \"plain\"", 1, &["no URDF and no MJCF file"]),
     (
         "<robot name=\"plain\">",
         "<!DOCTYPE r [<!ENTITY a \"&b;&b;\">]><robot name=\"plain\">",
@@ -27,6 +28,8 @@ const CASES: &[(&str, &str, usize, &[&str])] = &[
     ("<robot name=\"plain\">", "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\"><xacro:arg/>", 1, &["xacro FILE"]),
     ("<robot name=\"plain\">", "<robot><xacro:arg/>", 1, &["xacro FILE"]),
     ("lower=\"-1\"", "lower=\"${-pi/2}\"", 6, &["xacro"]),
+    ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"$(find arm)/hand.stl\"/>", 3, &["xacro FILE"]),
+    ("<box size=\"0.1 0.02 0.02\"/>", "<mesh filename=\"package://${arm}/hand.stl\"/>", 3, &["xacro FILE"]),
     ("name=\"turn\"", "name=\"a&#10;b: sound\"", 5, &["\\u000a", "U+000A"]),
     ("lower=\"-1\"", "lower=\"one\"", 6, &["\"one\"", "no number"]),
     ("lower=\"-1\"", "lower=\"nan\"", 6, &["nan"]),

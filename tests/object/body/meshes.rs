@@ -111,10 +111,13 @@ fn what_a_header_does_not_announce_and_coordinates_that_are_no_lengths_are_refus
         lines.join("\n").into_bytes()
     };
     let (nodes, faces) = prism(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0);
+    let cut = |bytes: usize| binary[..binary.len() - bytes].to_vec();
     let obj = |number: &str| obj_of(&nodes, &faces).replacen("v 0", &format!("v {number}"), 1).into_bytes();
     for (ending, content, expected) in [
         ("ply", (text.clone() + "3 0 1 2\n").into_bytes(), "7 bytes follow the last element"),
         ("ply", [binary, &b"\0"[..]].concat(), "1 byte follows the last element"),
+        ("ply", cut(1), "it ends within a face: it was cut off; export the mesh again"),
+        ("ply", cut(13 * 12 + 1), "it ends within a vertex: it was cut off"),
         ("ply", with("nan 0 0"), "vertex 0, counted from 0, is not a line of finite numbers: \"nan 0 0\""),
         ("ply", with("0 0,5 0"), "vertex 0, counted from 0, is not a line of finite numbers"),
         ("ply", with("1e30 0 0"), "node 0, counted from 0, has a coordinate"),
@@ -336,9 +339,12 @@ fn a_face_that_cannot_be_cut_is_refused_at_its_place() {
     let (nodes, mut faces) = prism(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]], 0);
     faces[5][2] = 8;
     let error = build_from("ply", ply_of(&nodes, &faces).as_bytes()).unwrap_err().to_string();
-    assert!(error.contains("face 5, counted from 0: a face names node 8, counted from 0, of 8"), "{error}");
+    assert!(
+        error.contains("face 5, counted from 0: a face names node 8, counted from 0, of 8: export the mesh again"),
+        "{error}"
+    );
     let error = build_from("obj", obj_of(&nodes, &faces).as_bytes()).unwrap_err().to_string();
-    assert!(error.contains("line 14: a face names vertex 9, of 8"), "{error}");
+    assert!(error.contains("line 14: a face names vertex 9, of 8: export the mesh again"), "{error}");
     // A hole that a bridge joins to the outline, which is passed twice.
     let holed: Vec<[f64; 2]> = [[0, 0], [3, 0], [3, 3], [0, 3], [0, 0], [1, 1], [1, 2], [2, 2], [2, 1], [1, 1]]
         .iter()
@@ -386,8 +392,16 @@ fn an_obj_file_is_read_however_its_program_writes_it() {
         let error = build_from("obj", &content).unwrap_err().to_string();
         assert!(error.contains("not an OBJ text"), "{error}");
     }
-    let error = build_from("obj", &text.as_bytes()[..first_face]).unwrap_err().to_string();
-    assert!(error.contains("no triangles"), "{error}");
+    for (faces, expected) in [
+        ("", "no triangles: export its faces"),
+        ("l 1 2\n", "no triangles: export its faces"),
+        ("f 0 1 2\n", "numbers of vertices, counted from 1: \"f 0 1 2\""),
+        ("f 1 2 -9\n", "numbers of vertices, counted from 1"),
+        ("f 1 2 9\n", "names vertex 9, of 8: export the mesh again"),
+    ] {
+        let error = build_from("obj", format!("{}{faces}", &text[..first_face]).as_bytes()).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 #[test]

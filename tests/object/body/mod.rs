@@ -171,7 +171,10 @@ fn flat_and_broken_triangles_are_refused() {
         alter(&mut nodes, &mut triangles);
         defect(&nodes, &triangles)
     };
-    assert_eq!(altered(&|_, triangles| triangles.clear()), "the surface has no triangles");
+    assert_eq!(
+        altered(&|_, triangles| triangles.clear()),
+        "the surface has no triangles: export its faces, not points or lines alone"
+    );
     assert!(altered(&|nodes, _| nodes[5].y = f64::NAN).starts_with("node 5 has a coordinate that is not a finite"));
     assert!(altered(&|nodes, _| nodes[9] = nodes[40]).starts_with("nodes 9 and 40 lie at the same point"));
     let alone = altered(&|nodes, _| nodes.push(DVec3::ONE));

@@ -6,8 +6,7 @@
 //! joints; where the formula and its two halves differ (a boundary crossed within the cell, more joints) the stretch is
 //! halved.
 
-use super::TorqueField;
-use crate::JointVector;
+use haptize::{JointVector, field::TorqueField};
 
 /// Difference, relative to the integral of the power's size over the whole line, at which one stretch of a work
 /// integral is good enough (1): fractions of a cell are rounded by some tens of eps, and the torque with them.
@@ -31,12 +30,14 @@ const LOBATTO: [(f64, f64); 5] = [
     (1.0, 1.0 / 45.0),
 ];
 
-impl TorqueField {
-    /// Work of the torque on the proxy along the straight line `from`..`to` (J). Not for the haptic loop.
-    #[must_use]
-    pub fn work(&self, from: &JointVector, to: &JointVector) -> f64 {
+/// Work of the torque of a field along straight lines.
+pub struct Work<'a>(pub &'a TorqueField);
+
+impl Work<'_> {
+    /// That along the line `from`..`to` (J).
+    pub fn along(&self, from: &JointVector, to: &JointVector) -> f64 {
         let mut cuts = vec![0.0, 1.0];
-        for ((axis, start), end) in self.grid.axes.iter().zip(from.iter()).zip(to.iter()) {
+        for ((axis, start), end) in self.0.grid().axes.iter().zip(from.iter()).zip(to.iter()) {
             let crossed = (0..axis.count).map(|k| (axis.coordinate(k) - start) / (end - start));
             cuts.extend(crossed.filter(|cut| *cut > 0.0 && *cut < 1.0));
         }
@@ -47,11 +48,10 @@ impl TorqueField {
         stretches.into_iter().map(|stretch| self.stretch(from, to, stretch, tolerance)).sum()
     }
 
-    /// Work around the closed polygon with corners `path` (J).
-    #[must_use]
-    pub fn work_around(&self, path: &[JointVector]) -> f64 {
+    /// That around the closed polygon with corners `path` (J).
+    pub fn around(&self, path: &[JointVector]) -> f64 {
         let next = path.iter().cycle().skip(1);
-        path.iter().zip(next).map(|(from, to)| self.work(from, to)).sum()
+        path.iter().zip(next).map(|(from, to)| self.along(from, to)).sum()
     }
 
     /// The work of one stretch, halved until two halves differ from the whole by no more than `tolerance` (J).
@@ -87,7 +87,7 @@ impl TorqueField {
             for x in [middle - half * node, middle + half * node] {
                 let (mut q, mut power, mut size) = (*from, 0.0, 0.0);
                 q.iter_mut().zip(to.iter()).for_each(|(q, to)| *q += x * (to - *q));
-                for ((tau, from), to) in self.sample(&q).torque.iter().zip(from.iter()).zip(to.iter()) {
+                for ((tau, from), to) in self.0.sample(&q).torque.iter().zip(from.iter()).zip(to.iter()) {
                     let summand = tau * (to - from);
                     power += summand;
                     size += summand.abs();
