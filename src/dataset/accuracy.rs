@@ -204,11 +204,11 @@ impl MeasuredError {
 
     /// What keeps the torque from leaping within a cell, after a colon.
     fn remedy_for_cuts(&self) -> String {
+        let otherwise = |what: &str| format!(": if a finer grid does not help, {what}");
         match (self.rounding, self.rounded, self.geometry) {
-            (Some(length), None, _) => format!(
-                ": if a finer grid does not help, round = {length:.4} in [contact] rounds the body's edges, and takes some 3 \
-                 times as long"
-            ),
+            (Some(length), None, _) => otherwise(&format!(
+                "round = {length:.4} in [contact] rounds the body's edges, and takes some 3 times as long"
+            )),
             (Some(length), Some(_), _) => {
                 format!(": round = {length:.4} in [contact] is what this grid follows, or a finer grid")
             }
@@ -217,13 +217,9 @@ impl MeasuredError {
                 1e3 * length
             ),
             (None, None, Some(_)) => {
-                ": if a finer grid does not help, law = \"following\" leaps less at edges, and takes 4 to \
-                                      8 times as long on a CPU"
-                    .to_owned()
+                otherwise("law = \"following\" leaps less at edges, and takes 4 to 8 times as long on a CPU")
             }
-            (None, None, None) => {
-                ": if a finer grid does not help, the body has several equilibria there, or sharp edges".to_owned()
-            }
+            (None, None, None) => otherwise("the body has several equilibria there, or sharp edges"),
         }
     }
 }

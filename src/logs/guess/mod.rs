@@ -306,29 +306,25 @@ impl MappingFacts<'_> {
         if pulls > 0.0 || self.joints.iter().any(|joint| joint.of_motor) {
             self.effort = Effort::Motor;
         }
-        doubts.push(match self.effort {
+        let mut told = vec![match self.effort {
             Effort::Motor if pulls <= 0.0 => {
                 "the torque is taken to be the motor's, as its name says, though it does not grow on the way in"
-                    .to_owned()
             }
             Effort::Motor => {
-                "the torque is taken to be the motor's, which balances the contact: it grows on the way in; \
-                              if it is the contact's own, the object would pull"
-                    .to_owned()
+                "the torque is taken to be the motor's, which balances the contact: it grows on the way in; if it is the \
+                 contact's own, the object would pull"
             }
-            Effort::Contact if pulls < 0.0 => {
-                "the torque is taken to be the contact's own: it pushes the arm back".to_owned()
-            }
-            Effort::Contact => "nothing tells whether the torque is the contact's own or the motor's".to_owned(),
-        });
-        doubts.push("torques must not contain the weight of the arm".to_owned());
+            Effort::Contact if pulls < 0.0 => "the torque is taken to be the contact's own: it pushes the arm back",
+            Effort::Contact => "nothing tells whether the torque is the contact's own or the motor's",
+        }];
+        told.push("torques must not contain the weight of the arm");
         self.average = self.to_and_fro().map(|still| (still, ranges.iter().map(|range| range / CELLS).collect()));
         if self.average.is_some() {
-            doubts.push(
-                "the first joint goes to and fro: the mean of both directions is taken, in which dry friction cancels"
-                    .to_owned(),
+            told.push(
+                "the first joint goes to and fro: the mean of both directions is taken, in which dry friction cancels",
             );
         }
+        doubts.extend(told.into_iter().map(str::to_owned));
         let mut text = String::new();
         // Writing to a string fails only where memory does.
         let _ = self.write(&mut text, log, &doubts);
