@@ -199,15 +199,34 @@ impl Describe for Reached {
         if !self.costs.is_empty() {
             text.line("\nrms error      points        solving from rest   file");
         }
-        for Cost { relative, points, seconds, bytes, is_known, .. } in &self.costs {
-            let doubt = if *is_known { "" } else { "   far beyond what was tried" };
-            let [error, points] = [format!("{} %", 100.0 * relative), format!("{points:.2e}")];
-            let [time, size] = [duration(*seconds), watch::megabytes(*bytes as usize)];
-            text.line(format_args!("{error:<14} {points:<13} {time:<19} {size}{doubt}"));
-        }
+        self.costs.iter().for_each(|cost| text.line(costs(cost)));
         for found in self.grid.iter().chain(&self.refusal) {
             text.line(format_args!("\n{}", found.trim_end()));
         }
         self.written.iter().for_each(|scene| text.row("written to", scene));
+    }
+}
+
+/// What an error takes. Time and size are told within what errors are extrapolated to.
+fn costs(Cost { relative, points, seconds, bytes, is_known, .. }: &Cost) -> String {
+    let [error, points] = [format!("{} %", 100.0 * relative), format!("{points:.2e}")];
+    if *is_known {
+        let [time, size] = [duration(*seconds), watch::megabytes(*bytes as usize)];
+        format!("{error:<14} {points:<13} {time:<19} {size}")
+    } else {
+        format!("{error:<14} {points:<13} far beyond what was tried")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_and_size_of_what_was_not_nearly_tried_are_not_told() {
+        let cost = Cost { relative: 0.05, points: 1.9e13, finer: 193.0, seconds: 4e9, bytes: 4e15, is_known: false };
+        assert_eq!(costs(&cost), "5 %            1.90e13       far beyond what was tried");
+        let known = Cost { points: 1.9e4, seconds: 2.0, bytes: 1.5e6, is_known: true, ..cost };
+        assert_eq!(costs(&known), "5 %            1.90e4        2.0 s               2 MB");
     }
 }

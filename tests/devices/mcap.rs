@@ -151,7 +151,10 @@ fn joint_states_of_which_no_torque_can_be_made_are_refused_with_the_cause() {
     assert_eq!((report.samples, report.dropped[0].rows), (16, 34));
     // Two publishers, each of its own joint.
     let error = refused(states(&[0.5], |k| ["arm", "gripper"][k as usize % 2]), &["arm", "gripper"]);
-    assert!(error.contains("50 of 50 rows cannot be used") && error.contains("(--columns) with `bad_rows = \"drop\"`"), "{error}");
+    assert!(
+        error.contains("50 of 50 rows cannot be used") && error.contains("(--columns) with `bad_rows = \"drop\"`"),
+        "{error}"
+    );
     let nameless = refused(states(&[0.5], |k| ["x", " "][usize::from(k > 2)]), &["x"]);
     assert!(nameless.contains("message 4 of /joint_states is no") && nameless.contains("a name is blank"));
     let states_of_none = refused(vec![("/joint_states", state(0, &[], &[], &[]))], &["x"]);

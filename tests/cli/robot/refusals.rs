@@ -103,7 +103,7 @@ fn other_files_are_told_apart() {
     let error = |text: &str| Robot::parse(text.into(), "model.xml").unwrap_err().to_string();
     assert!(error("<sdf version=\"1.9\"/>").contains("<sdf>"));
     assert!(error("<mujoco model=\"x\"/>").contains("no <worldbody>"));
-    assert!(error("").contains("not well-formed"));
+    assert!(error("").contains("no URDF and no MJCF file") && error("<robot").contains("not well-formed"));
     let xacro = Robot::parse(PLAIN.into(), "plain.urdf.xacro").unwrap_err().to_string();
     assert!(xacro.contains("pip install xacro"), "{xacro}");
     let folder = Robot::load(file("")).unwrap_err().to_string();

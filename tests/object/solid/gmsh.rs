@@ -277,7 +277,7 @@ fn damaged_files_are_refused_with_the_line_and_never_panic() {
         ("2.2", "2.2 0 8", "2.2 1 8", "the number one is expected here"),
         ("2.2", "2.2 0 8", "2.2 1 4", "line 2: its numbers have 4 bytes"),
         ("4.1", "4.1 0 8", "3.0 0 8", "line 2: only versions 2.2 and 4.1"),
-        ("2.2", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes", "$NOD", "line 1: only versions 2.2 and 4.1"),
+        ("2.2", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames", "$NOD", "line 1: only versions 2.2 and 4.1"),
         ("2.2", "$Nodes\n27", "$Nodes\n28", "line 37: such a number as belongs here"),
         ("2.2", "10 0 0 0", "10 0 x 0", "line 10: such a number as belongs here"),
         ("2.2", "11 0 0 0.1", "10 0 0 0.1", "line 11: node 10 is there twice"),
