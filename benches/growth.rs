@@ -14,7 +14,6 @@ mod clock;
 use clock::nanoseconds;
 use haptize::{
     JointVector,
-    contact::Model,
     dataset::Grid,
     draw::{
         colour,
@@ -25,7 +24,7 @@ use haptize::{
     report::write_both,
     scene::{ProxyNodeSpec, Scene},
     store::{Store, record::width},
-    sweep::{CpuBackend, Reference, build_object, grid_of, refine::Refine, sample},
+    sweep::{CpuBackend, Reference, build_object, grid_of, model_within, refine::Refine},
 };
 use rustix::time::{ClockId, clock_gettime};
 use std::{hint::black_box, path::Path};
@@ -137,7 +136,7 @@ fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 2] {
     let scene = held(scene, joints);
     let object = build_object(&scene).unwrap();
     let chain = Chain::new(&scene.proxy);
-    let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
+    let mut model = model_within(&scene, &object, &chain).unwrap();
     model.with_tangent = true;
     let mut judges = [1, 2].map(|seed| Reference::in_contact(&scene, &model, seed, JUDGED).unwrap());
     let mut backend = CpuBackend::new(&model, 0).unwrap();

@@ -14,7 +14,7 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::{ContactLaw, Scene, Shape},
-    sweep::{Backend, BackendChoice, Bake, CpuBackend, build_object, sample},
+    sweep::{Backend, BackendChoice, Bake, CpuBackend, build_object, model_within, sample},
 };
 use std::{
     error::Error,
@@ -79,8 +79,8 @@ fn sweep(context: &Arc<Context>, name: &str) -> Result<(), Box<dyn Error>> {
     let hardware = context.adapter().hardware;
     let scene = refined(&load(name)?, if hardware { SWEPT } else { 1 });
     let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
-    let all = sample(&scene);
-    let mut model = Model::reaching(&object, &chain, scene.contact, &all)?;
+    let mut model = model_within(&scene, &object, &chain)?;
+    let all = sample(&scene, &model);
     model.with_tangent = true;
     let stride = if hardware { 1 } else { SOFTWARE_STRIDE };
     let configurations: Vec<JointVector> = all.into_iter().step_by(stride).collect();
@@ -139,8 +139,8 @@ fn work(model: &Model<'_>, equilibria: &[Equilibrium]) -> [f64; 2] {
 fn busy(context: &Arc<Context>, name: &str) -> Result<(), Box<dyn Error>> {
     let scene = refined(&load(name)?, SWEPT);
     let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
-    let configurations = sample(&scene);
-    let model = Model::reaching(&object, &chain, scene.contact, &configurations)?;
+    let model = model_within(&scene, &object, &chain)?;
+    let configurations = sample(&scene, &model);
     let mut solver = GpuSolver::new(Arc::clone(context), &model)?;
     let mut rates = Vec::with_capacity(BUSY_TURNS);
     for _ in 0..BUSY_TURNS {

@@ -14,7 +14,7 @@ mod desktop;
 use clock::nanoseconds;
 use haptize::{
     JointVector, MAX_AXES,
-    contact::{Model, Status},
+    contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
     draw::diagram::{Diagram, Series},
     field::TorqueField,
@@ -27,7 +27,7 @@ use haptize::{
         Nodes, Place, Space, Store,
         record::{slope, width},
     },
-    sweep::{BackendChoice, Bake, CpuBackend, Reference, build_object, refine::Refine, sample},
+    sweep::{BackendChoice, Bake, CpuBackend, Reference, build_object, model_within, refine::Refine},
 };
 use std::{
     hint::black_box,
@@ -214,7 +214,7 @@ fn main() {
     let scene = Scene::load(Path::new(path)).unwrap();
     let object = build_object(&scene).unwrap();
     let chain = Chain::new(&scene.proxy);
-    let mut model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
+    let mut model = model_within(&scene, &object, &chain).unwrap();
     model.with_tangent = true;
     let mut judges = [11, 12].map(|seed| Reference::in_contact(&scene, &model, seed, 1000).unwrap());
     let mut backend = CpuBackend::new(&model, 0).unwrap();

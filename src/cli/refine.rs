@@ -10,16 +10,16 @@ use super::{
     watch::megabytes,
 };
 use crate::{
-    contact::{Backend, Model},
+    contact::Backend,
     dataset::{MeasuredError, Provenance, Surface},
     names::counted,
     proxy::Chain,
     scene::Scene,
     store::Store,
     sweep::{
-        Aim, BackendChoice, ChosenBackend, CpuBackend, Reference, build_object, grid_of,
+        Aim, BackendChoice, ChosenBackend, CpuBackend, Reference, build_object, grid_of, model_within,
         refine::{Refine, Refined},
-        remark_on_mesh, sample,
+        remark_on_mesh,
     },
 };
 use serde::Serialize;
@@ -112,7 +112,7 @@ pub fn run(
     let aim = goal.aim.checked(scene)?;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
-    let mut model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
+    let mut model = model_within(scene, &object, &chain)?;
     model.with_tangent = true;
     model.with_slip = scene.haptics.uses_slip();
     let warning = remark_on_mesh(&model).and_then(|error| error.warning());

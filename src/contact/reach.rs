@@ -61,24 +61,36 @@ impl<'a> Model<'a> {
         if contact.round.is_some() {
             check_rounding(&RestSurface::new(object, contact.surface), chain, contact)?;
         }
+        let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, Vec::new())?);
+        model.reach(configurations)?;
+        Ok(model)
+    }
+
+    /// Forms what contact at or near `configurations` needs, in the place of what there is.
+    ///
+    /// # Errors
+    /// As [`Model::reaching`].
+    pub fn reach(&mut self, configurations: &[JointVector]) -> Result<(), Error> {
+        let object = self.object;
         let is_whole = object.surface_nodes <= Self::WHOLE && !configurations.is_empty();
-        let nodes = if is_whole { (0..object.surface_nodes as u32).collect() } else { Vec::new() };
-        let mut model = Self::with_compliance(object, chain, contact, Compliance::on(object, nodes)?);
-        if let Some(rounded) = model.rounded.clone() {
-            let mut points = rounded.near(greatest_radius(chain));
+        if is_whole {
+            self.take_compliance(Compliance::on(object, (0..object.surface_nodes as u32).collect())?);
+        }
+        if let Some(rounded) = self.rounded.clone() {
+            let mut points = rounded.near(greatest_radius(self.chain));
             if configurations.is_empty() || count(&points) > Self::WHOLE_POINTS {
-                points = reached(&model, configurations);
+                points = reached(self, configurations);
                 check_points(count(&points))?;
             }
             if !is_whole {
-                model.take_compliance(Compliance::on(object, rounded.nodes(&points))?);
+                self.take_compliance(Compliance::on(object, rounded.nodes(&points))?);
             }
-            model.want(points);
+            self.want(points);
         } else if !is_whole {
-            let nodes = nodes_of_leaves(&model, &reached(&model, configurations));
-            model.take_compliance(Compliance::on(object, nodes)?);
+            let nodes = nodes_of_leaves(self, &reached(self, configurations));
+            self.take_compliance(Compliance::on(object, nodes)?);
         }
-        Ok(model)
+        Ok(())
     }
 }
 

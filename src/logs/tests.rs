@@ -175,7 +175,7 @@ fn mappings_that_cannot_be_are_refused_with_the_line_and_the_key() {
     bad("column = 1\n", "column = 1\nscale = nan\n", "4:9", "time.scale");
     bad("column = 1\n", "period = 0.0\n", "3:10", "time.period");
     bad("[time]", "[time]\ngap = -1.0", "3:7", "time.gap");
-    bad("name = \"a\"", "name = \"\"", "5:8", "is empty");
+    bad("name = \"a\"", "name = \"\"", "5:8", "is blank");
     bad("name = \"a\"", "name = \"a\\nb: 7128 points, sound\"", "5:8", "a\\u000ab: 7128");
     bad("name = \"a\"", "name = \"a\\u202eb\"", "5:8", "U+202E");
     bad("name = \"a\"", "name = \"a\"\nunit = \"deg\"", "6:8", "unit = \"deg\" }");

@@ -10,7 +10,7 @@ use crate::{
     dataset::Dataset,
     proxy::{Chain, Pose},
     scene::Scene,
-    sweep::{BackendChoice, Bake, CpuBackend, Run, Sweep, SweepReport, build_object, sample},
+    sweep::{BackendChoice, Bake, CpuBackend, Run, Sweep, SweepReport, build_object, model_within},
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -143,7 +143,7 @@ pub fn haptize(bake: Bake<'_>) -> Result<(Dataset, SweepReport), Error> {
     let Bake { scene, measured, date, stop, progress, .. } = bake;
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
-    let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
+    let model = model_within(scene, &object, &chain)?;
     let mut backend = PaperBackend::new(&model);
     let mut sweep = Sweep::new(scene, &object, "cpu", &CpuBackend::adapter(), date)?;
     sweep.diagnose(&model);

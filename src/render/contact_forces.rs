@@ -105,10 +105,9 @@ fn solved(dataset: &Dataset, surface: &Surface, nodes: usize) -> Result<Direct, 
 mod tests {
     use super::*;
     use crate::{
-        contact::Model,
         proxy::Chain,
         store::{Space, Store},
-        sweep::{CpuBackend, build_object, grid_of, sample},
+        sweep::{CpuBackend, build_object, grid_of, model_within},
     };
     use std::sync::Arc;
 
@@ -122,7 +121,7 @@ mod tests {
         let store = Arc::new(Store::new(Space::new(&grid, 2).unwrap()));
         let provenance = CpuBackend::provenance(&scene);
         let mut dataset = Dataset::refined(store, grid, Some(Surface::of(&object)), text, provenance);
-        let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
+        let model = model_within(&scene, &object, &chain).unwrap();
         let equilibrium = Solver::new(&model).solve(&scene.motion.press[2].q);
         assert_eq!(equilibrium.status, Status::Contact);
         let drawn = ContactForces::new(&dataset, nodes).unwrap();

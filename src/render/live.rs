@@ -74,7 +74,7 @@ impl LiveScene {
         let direct = Direct::of(&scene, object)?;
         remark_on_mesh(direct.model());
         let grid = region(&scene, direct.model().compliance.is_whole());
-        let tangents = tangents(direct.model(), &sample(&scene));
+        let tangents = tangents(direct.model(), &sample(&scene, direct.model()));
         Ok(Self { scene, direct, grid, tangents, follows, relaxation: None })
     }
 

@@ -1,14 +1,13 @@
 //! From a scene to its dataset: object and proxy are built, a backend is chosen, and the grid is swept.
 
-use super::{BackendChoice, ChosenBackend, Progress, Run, Shard, Sweep, SweepReport};
+use super::{BackendChoice, ChosenBackend, Progress, Run, Shard, Sweep, SweepReport, model_within};
 use crate::{
-    Error, ErrorKind, JointVector, MAX_AXES,
+    Error, ErrorKind,
     contact::{MeshRipple, Model},
     dataset::Dataset,
     object::{Compliance, LatticeError, Object},
     proxy::Chain,
-    random::Random,
-    scene::{AxisSpec, JointSpec, Scene},
+    scene::Scene,
 };
 use std::{
     path::{Path, PathBuf},
@@ -145,7 +144,7 @@ impl Bake<'_> {
 
 /// The model by which the grid of `scene` is solved.
 pub(crate) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, Error> {
-    let mut model = Model::reaching(object, chain, scene.contact, &sample(scene))?;
+    let mut model = model_within(scene, object, chain)?;
     model.with_tangent = scene.uses_tangent();
     model.with_slip = scene.haptics.uses_slip();
     Ok(model)
@@ -166,49 +165,4 @@ pub(crate) fn sweep_of<'a>(
     sweep.find_lowest(model)?;
     sweep.measure_error(model, &scene.haptics, measured)?;
     Ok(sweep)
-}
-
-/// A random configuration within the limits of `joints`.
-pub(super) fn drawn(random: &mut Random, joints: &[JointSpec]) -> JointVector {
-    joints.iter().map(|joint| random.between(joint.limits[0], joint.limits[1])).collect()
-}
-
-/// Grid points at which the proxy's reach is looked up, at most: between them it grows by less than what is added to
-/// it.
-const SAMPLES: usize = 1 << 16;
-
-/// Configurations spread over the scene's grid, all of them where they are few, or over the joint limits where it
-/// leaves the grid out, at random where the arm has more joints than a grid has axes: what [`Model::reaching`] looks
-/// at.
-#[must_use]
-pub fn sample(scene: &Scene) -> Vec<JointVector> {
-    let joints = &scene.proxy.joints;
-    if joints.len() > MAX_AXES {
-        let mut random = Random::new(1);
-        return (0..SAMPLES).map(|_| drawn(&mut random, joints)).collect();
-    }
-    let count = (SAMPLES as f64).powf(1.0 / joints.len().max(1) as f64) as usize;
-    let limits =
-        |[least, greatest]: [f64; 2]| AxisSpec { start: least, step: (greatest - least) / (count - 1) as f64, count };
-    let axes = match &scene.grid.axes[..] {
-        [] => joints.iter().map(|joint| limits(joint.limits)).collect(),
-        axes => axes.to_vec(),
-    };
-    let points: usize = axes.iter().map(|axis| axis.count).fold(1, usize::saturating_mul);
-    // The same stride along each axis, the last line always included.
-    let stride = (1..).find(|stride| points / usize::pow(*stride, axes.len() as u32).max(1) <= SAMPLES).unwrap_or(1);
-    let mut configurations = vec![JointVector::zeros(axes.len())];
-    for (j, axis) in axes.iter().enumerate() {
-        let lines = (0..axis.count - 1).step_by(stride).chain([axis.count - 1]);
-        let values: Vec<f64> = lines.map(|k| axis.start + k as f64 * axis.step).collect();
-        let grown = configurations.iter().flat_map(|q| {
-            values.iter().map(move |&value| {
-                let mut q = *q;
-                q[j] = value;
-                q
-            })
-        });
-        configurations = grown.collect();
-    }
-    configurations
 }

@@ -171,7 +171,8 @@ mod tests {
         let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
         let model = Model::new(&object, &chain, scene.contact);
-        let configurations: Vec<JointVector> = super::super::sample(&scene).into_iter().step_by(37).take(101).collect();
+        let configurations: Vec<JointVector> =
+            super::super::sample(&scene, &model).into_iter().step_by(37).take(101).collect();
         let mut backend = CpuBackend::new(&model, 3).unwrap();
         let at_once = backend.solve(&configurations).unwrap();
         assert!(at_once.iter().any(|equilibrium| equilibrium.torque.norm() > 0.0), "some are in contact");
@@ -199,7 +200,8 @@ mod tests {
         let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
         let model = Model::new(&object, &chain, scene.contact);
         let solvers = Solvers::new(&model, 1);
-        let configurations: Vec<JointVector> = super::super::sample(&scene).into_iter().step_by(37).take(64).collect();
+        let configurations: Vec<JointVector> =
+            super::super::sample(&scene, &model).into_iter().step_by(37).take(64).collect();
         let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let torques = || -> Vec<JointVector> {
             pool.install(|| solvers.map(&configurations, |solver, q| solver.solve(q).torque))

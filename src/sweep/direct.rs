@@ -1,7 +1,7 @@
 //! Equilibria solved directly, wherever they are asked for: what a program calls that has no dataset, or wants to check
 //! one.
 
-use super::{Inspection, build_object, sample};
+use super::{Inspection, build_object, model_within};
 use crate::{
     Error,
     contact::{Model, Solvers, Status},
@@ -40,10 +40,8 @@ impl Direct {
     /// # Errors
     /// When its compliance cannot be formed.
     pub fn of(scene: &Scene, object: Object) -> Result<Self, Error> {
-        Prepared::try_new((object, Chain::new(&scene.proxy)), |(object, chain)| {
-            Model::reaching(object, chain, scene.contact, &sample(scene))
-        })
-        .map(Self)
+        Prepared::try_new((object, Chain::new(&scene.proxy)), |(object, chain)| model_within(scene, object, chain))
+            .map(Self)
     }
 
     /// The object and the proxy, prepared.

@@ -25,6 +25,7 @@ mod plan;
 mod reach;
 pub(crate) mod reference;
 pub mod refine;
+mod region;
 mod report;
 mod shard;
 mod sharded;
@@ -35,7 +36,7 @@ pub(crate) mod thin_parts;
 mod tile;
 
 pub use crate::contact::Backend;
-pub use bake::{Bake, baked, build_object, remark_on_mesh, sample};
+pub use bake::{Bake, baked, build_object, remark_on_mesh};
 #[cfg(feature = "viewer")]
 pub(crate) use bake::{model_of, sweep_of};
 #[cfg(feature = "viewer")]
@@ -59,5 +60,6 @@ pub use plan::{Plan, ShardCost};
 pub(crate) use reach::shallow;
 pub use reach::{DepthShare, JointReach, Reach};
 pub use reference::{REFERENCE_TOLERANCE, Reference};
+pub use region::{model_within, sample};
 pub use report::{Iterations, SweepReport};
 pub use shard::{EXTENSION as SHARD_EXTENSION, Shard, ranges};

@@ -8,7 +8,7 @@
 //! are relative to the rms of the torque itself. Where torque jumps, the worst error is as large as the jump on any
 //! grid: it is reported, and not promised.
 
-use super::{BackendChoice, Bake, build_object, grid_sweep::check_given, reference::Reference, sample, spacing};
+use super::{BackendChoice, Bake, build_object, grid_sweep::check_given, model_within, reference::Reference, spacing};
 use crate::{
     Error,
     contact::Model,
@@ -208,7 +208,7 @@ impl Pilot {
         check_given(scene)?;
         let aim = aim.checked(scene)?;
         let (object, chain) = (build_object(scene)?, Chain::new(&scene.proxy));
-        let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
+        let model = model_within(scene, &object, &chain)?;
         let reference = Reference::in_contact(scene, &model, SEED, CONTACTS)?;
         let joints = scene.grid.axes.len();
         let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);

@@ -1,6 +1,6 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::{bake::drawn, build_object, grid_sweep::check_axes};
+use super::{build_object, grid_sweep::check_axes, region::drawn};
 use crate::{
     Error, JointVector,
     contact::{Model, Proximity},
@@ -152,7 +152,8 @@ impl Placing {
         let mut best: Option<Attempt> = None;
         for number in 0..POSTURES {
             let first = posture.map_or(middle, |(_, q)| q);
-            let start = if number == 0 { first } else { drawn(&mut random, &chain.joints) };
+            let start =
+                if number == 0 { first } else { drawn(&mut random, chain.joints.iter().map(|joint| joint.limits)) };
             let attempt = stand.attempt(&mut proximity, tip, start);
             if best.as_ref().is_none_or(|best| attempt.is_better(best, standoff)) {
                 best = Some(attempt);

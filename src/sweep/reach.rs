@@ -5,7 +5,7 @@
 //! most as deep as asked for; the grid's ranges are the least box that holds all of it that was met. Its lines are so
 //! far apart that a step along any axis moves the proxy by about as much as along any other.
 
-use super::{bake::drawn, build_object, grid_sweep::check_axes, spacing};
+use super::{build_object, grid_sweep::check_axes, region::drawn, spacing};
 use crate::{
     Error, ErrorKind, JointVector,
     contact::{Model, NodeTree},
@@ -244,7 +244,8 @@ pub(crate) fn shallow(object: &Object) -> f64 {
 
 /// A round of random configurations within the joint limits.
 fn measured(model: &Model<'_>, tree: &NodeTree, scene: &Scene, random: &mut Random) -> Vec<Met> {
-    let drawn: Vec<JointVector> = (0..ROUND).map(|_| drawn(random, &scene.proxy.joints)).collect();
+    let drawn: Vec<JointVector> =
+        (0..ROUND).map(|_| drawn(random, scene.proxy.joints.iter().map(|joint| joint.limits))).collect();
     drawn.into_par_iter().map(|q| Met { gap: tree.touching_gap(model, &q), q }).collect()
 }
 

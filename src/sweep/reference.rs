@@ -263,7 +263,7 @@ mod tests {
     use super::*;
     use crate::{
         proxy::Chain,
-        sweep::{build_object, sample},
+        sweep::{build_object, model_within},
     };
 
     #[test]
@@ -272,7 +272,7 @@ mod tests {
         let text = include_str!("../../tests/scenes/small.toml").replace("[contact]", "[contact]\nlaw = \"following\"");
         let scene = Scene::parse(&text, "small.toml").unwrap();
         let (object, chain) = (build_object(&scene).unwrap(), Chain::new(&scene.proxy));
-        let model = Model::reaching(&object, &chain, scene.contact, &sample(&scene)).unwrap();
+        let model = model_within(&scene, &object, &chain).unwrap();
         let grown = Reference::in_contact(&scene, &model, 5, 24).unwrap();
         // More than the first draw, and no more than is needed.
         assert!(grown.solved() > 48 && grown.in_contact >= 24, "{} of {}", grown.in_contact, grown.solved());

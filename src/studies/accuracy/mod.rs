@@ -21,14 +21,13 @@ pub use report::{FILES, write_all};
 
 use crate::{
     Error,
-    contact::Model,
     names::duration,
     proxy::Chain,
     scene::{ContactLaw, JointKind, NormUnit, Scene},
     sweep::{
-        build_object,
+        build_object, model_within,
         reference::{Reference, equilibria},
-        sample, spacing,
+        spacing,
     },
 };
 use serde::Serialize;
@@ -144,7 +143,7 @@ pub fn measure(scene: &Scene, extent: Extent, progress: &mut dyn FnMut(&str)) ->
     let begun = Instant::now();
     let object = build_object(scene)?;
     let chain = Chain::new(&scene.proxy);
-    let model = Model::reaching(&object, &chain, scene.contact, &sample(scene))?;
+    let model = model_within(scene, &object, &chain)?;
     let build = begun.elapsed().as_secs_f64();
     progress("reference");
     let reference = Reference::solve(scene, &model, SEED, extent.configurations)?;

@@ -197,7 +197,8 @@ pub const SCENES: Target = Target {
         };
         let chain = Chain::new(&scene.proxy);
         let mut pose = chain.new_pose();
-        haptize::sweep::sample(&scene).iter().take(4).for_each(|q| chain.pose(q, &mut pose));
+        let limits = |end: usize| chain.joints.iter().map(|joint| joint.limits[end]).collect::<Vec<_>>();
+        [0, 1].map(limits).iter().for_each(|q| chain.pose(q, &mut pose));
         for waypoints in [&scene.motion.press, &scene.motion.scrape] {
             let _ = Motion::through(waypoints, chain.joints.len());
         }
