@@ -216,14 +216,14 @@ pub fn replaceable(output: &Path) -> Result<Option<(PathBuf, fs::Metadata)>, Fai
     Ok(Some((file, there)))
 }
 
-/// Writes `text` in the place of the file of `scene`, and returns the file's name.
+/// Writes `text` in the place of the scene that was `read` from `path`, and returns the file's name.
 ///
 /// # Errors
-/// When that makes no valid scene, or cannot be written.
-pub fn rewrite(scene: &Scene, text: &str) -> Result<String, Failure> {
-    Scene::parse(text, &scene.path)?;
-    rewrite_file(&scene.path, &scene.text, text).map_err(|error| Error::at(&scene.path, error))?;
-    Ok(scene.path.display().to_string())
+/// When that makes no valid scene, or cannot be written, or the file has changed since.
+pub fn rewrite(path: &Path, read: &str, text: &str) -> Result<String, Failure> {
+    Scene::parse(text, path)?;
+    rewrite_file(path, read, text).map_err(|error| Error::at(path, error))?;
+    Ok(path.display().to_string())
 }
 
 /// A folder that a command fills with files whose names it knows.

@@ -74,6 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     if arguments.write {
         output::replaceable(&arguments.scene)?;
     }
+    let read = scene.text.clone();
     let mut changed = Vec::new();
     if let Some(mesh) = &arguments.mesh {
         let turn = arguments.turn.unwrap_or_default();
@@ -100,7 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         let found = placing.tables(&scene.proxy.joints)?;
         text.replace(&found)?;
         if arguments.write {
-            written = Some(output::rewrite(&scene, &text.to_string())?);
+            written = Some(output::rewrite(&scene.path, &read, &text.to_string())?);
         }
         tables = Some(found);
     }

@@ -77,7 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         Some(grid) => {
             let mut text = SceneText::new(&scene.text, &scene.path)?;
             text.replace(grid)?;
-            Some(output::rewrite(&scene, &text.to_string())?)
+            Some(output::rewrite(&scene.path, &scene.text, &text.to_string())?)
         }
     };
     let scene = arguments.scene.display().to_string();

@@ -12,8 +12,8 @@ const TOO_MANY_POINTS: &str = "the grid has too many points";
 /// Checks the grid, and that all columns are as long as it asks for; `Err` says what is wrong.
 pub(crate) fn lengths(dataset: &Dataset) -> Result<(), String> {
     let points = dataset.grid.check()?;
-    let arrays = Stored::all().filter_map(|array| Some((array, dataset.stored(array)?)));
-    arrays.map(|(array, bytes)| length(array, bytes, &dataset.grid)).collect::<Result<(), _>>()?;
+    let mut arrays = Stored::all().filter_map(|array| Some((array, dataset.stored(array)?)));
+    arrays.try_for_each(|(array, bytes)| length(array, bytes, &dataset.grid))?;
     let offsets = dataset.contacts.as_ref().map(|contacts| contacts.offsets.len());
     offsets
         .map_or(Ok(()), |found| exactly(Stored::ContactOffsets, found, points.checked_add(1).ok_or(TOO_MANY_POINTS)?))
