@@ -113,6 +113,8 @@ mod tests {
         [object]
         sphere = { radius = 0.05, edge = 0.02, centre = [0.35, 0.0, 0.2] }
         skin = { tension = 100.0, width = 0.05, foundation = 4e4 }
+        [contact]
+        stiffness = 200.0
         [[proxy.joint]]
         kind = "revolute"
         axis = [0, 0, 1]

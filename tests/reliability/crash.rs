@@ -225,7 +225,7 @@ fn a_full_disk_is_an_error_and_the_bake_continues_when_there_is_room() {
     for share in [1, 40, 70, 99] {
         let old = whole.folder.path().join("x.haptize");
         // As much of an earlier dataset as tells it apart from other files.
-        let earlier = b"\x02\0\0\0\0\0\0\0{}";
+        let earlier = br#"........{"__metadata__":{"checksum":"00000000","format":"haptize 1"}}"#;
         std::fs::write(&old, earlier).unwrap();
         // Blocks of 512 bytes. Writing beyond the limit is an error, not a signal.
         let blocks = whole.bytes * share / 100 / 512;

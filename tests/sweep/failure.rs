@@ -15,7 +15,7 @@ fn a_failing_backend_leaves_a_part_and_the_earlier_file() {
     let whole = uninterrupted();
     let folder = Folder::new();
     // As much of an earlier dataset as tells it apart from other files.
-    let earlier = b"\x02\0\0\0\0\0\0\0{}";
+    let earlier = br#"........{"__metadata__":{"checksum":"00000000","format":"haptize 1"}}"#;
     std::fs::write(folder.output(), earlier).unwrap();
     let mut broken = MadeUp { breaks_after: 25, ..MadeUp::default() };
     let error = bake(&sweep(), &mut broken, &folder.output(), false, 10, usize::MAX).unwrap_err();

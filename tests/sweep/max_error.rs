@@ -100,7 +100,7 @@ fn an_error_that_no_grid_keeps_is_refused_before_anything_is_written() {
     let folder = Folder::new();
     std::fs::write(folder.0.path().join("a.toml"), text()).unwrap();
     // As much of an earlier dataset as tells it apart from other files.
-    let earlier = b"\x02\0\0\0\0\0\0\0{}";
+    let earlier = br#"........{"__metadata__":{"checksum":"00000000","format":"haptize 1"}}"#;
     std::fs::write(folder.output(), earlier).unwrap();
     for (error, points) in [("1e-7", "2000000"), ("0.02", "50")] {
         let arguments = ["bake", "a.toml", "--backend", "cpu", "--max-error", error, "--max-points", points];
