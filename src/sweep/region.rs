@@ -108,7 +108,8 @@ mod tests {
     use super::*;
     use crate::sweep::build_object;
 
-    /// Six joints with wide limits, of whose poses more than one in a thousand touches the ball, and none of those spread over them.
+    /// Six joints with wide limits: of their poses more than one in a thousand touches the ball, and none of those that
+    /// are spread over them.
     const RARE: &str = r#"
         [object]
         sphere = { radius = 0.05, edge = 0.02, centre = [0.35, 0.0, 0.2] }
