@@ -27,7 +27,9 @@ pub const STORES: Target = Target {
             let torque = root.torque();
             assert_eq!(torque.len(), joints);
         }
-        // What was taken in is a store: it is written, and read again, as it is.
+        // What was taken in is a store: it is written, and read again, as it is. Whoever made it may have begun its header
+        // otherwise than we do, and such a file is not replaced.
+        std::fs::remove_file(file).unwrap();
         read.save(file).unwrap();
         let again = Dataset::open(file).unwrap();
         let keys = |store: &Store| store.blocks().into_iter().map(|(key, _)| key).collect::<Vec<_>>();
