@@ -42,7 +42,12 @@ pub fn sample(scene: &Scene, model: &Model<'_>) -> Vec<JointVector> {
     }
     let tree = NodeTree::new(model.chain);
     let touches = |q: &JointVector| !tree.is_apart(model, q);
-    let mut touching = configurations.par_iter().filter(|q| touches(q)).count();
+    let mut touching = 0;
+    for share in configurations.chunks(TOUCHING) {
+        if touching < TOUCHING {
+            touching += share.par_iter().filter(|q| touches(q)).count();
+        }
+    }
     let (ranges, mut random) = (ranges(scene), Random::new(1));
     for _ in 0..ROUNDS {
         if touching >= TOUCHING {
