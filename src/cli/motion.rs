@@ -33,9 +33,9 @@ pub fn named(setup: &Setup, dataset: &Dataset, name: &str, topic: Option<&str>) 
     };
     no_topic(topic, name)?;
     if waypoints.is_empty() {
-        let known = "give [motion] in the scene such waypoints and bake it again, or a CSV file by --motion";
+        let known = "give its [motion] such waypoints, and bake it again if it was baked, or a CSV file by --motion";
         return Err(format!(
-            "the dataset's scene has no motion \"{name}\", and its contact is not such that one could be made: {known}"
+            "the scene has no motion \"{name}\", and its contact is not such that one could be made: {known}"
         )
         .into());
     }
