@@ -69,7 +69,8 @@ fn a_killed_program_is_resumed_to_the_same_numbers() {
 fn an_interrupted_program_says_how_to_resume() {
     let folder = Folder::new();
     let interrupted = program_at_work(&folder, 10_000);
-    kill_process(Pid::from_child(&interrupted), Signal::INT).unwrap();
+    // Not an interrupt from the keyboard, which what is started in the background of a script is made to ignore.
+    kill_process(Pid::from_child(&interrupted), Signal::TERM).unwrap();
     let output = interrupted.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8(output.stderr).unwrap();
