@@ -130,6 +130,9 @@ def test_progress_is_told_and_may_stop_a_bake(scene, tmp_path):
 
 
 def test_ctrl_c_stops_a_bake(scene):
+    # What is started in the background of a script is made to ignore it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
     def interrupt(done, points):
         signal.raise_signal(signal.SIGINT)
 
@@ -139,6 +142,7 @@ def test_ctrl_c_stops_a_bake(scene):
 
 INTERRUPTED = """
 import haptize, os, signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
 slow = haptize.Scene(sys.stdin.read())
 threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
