@@ -64,6 +64,25 @@ impl Cache {
         USED.get()
     }
 
+    /// The numbers that the cache of this process keeps under `key`; else those of `form`, which it keeps from now on.
+    ///
+    /// # Errors
+    /// Those of `form`.
+    pub(crate) fn numbers<E>(key: &[u8], form: impl FnOnce() -> Result<Vec<f64>, E>) -> Result<Vec<f64>, E> {
+        let Some(cache) = Self::used() else { return form() };
+        if let Some(kept) = cache.find(key) {
+            return Ok(bytemuck::pod_collect_to_vec(&kept));
+        }
+        let formed = form()?;
+        cache.keep(key, bytemuck::cast_slice(&formed));
+        Ok(formed)
+    }
+
+    /// Whether something is kept under `key`, sound or damaged.
+    pub(crate) fn holds(&self, key: &[u8]) -> bool {
+        self.place(key).exists()
+    }
+
     /// What is kept under `key`.
     pub(crate) fn find(&self, key: &[u8]) -> Option<Vec<u8>> {
         let path = self.place(key);

@@ -112,8 +112,7 @@ impl Equilibrium {
         Self::vectors(py, self.inspection.object_nodes.iter().map(|node| node.rest.to_array()))
     }
 
-    /// How far they have moved (m), shape (nodes, 3); not a number where the arm reaches too little of a large body for
-    /// its compliance to be formed there.
+    /// How far they have moved (m), shape (nodes, 3).
     #[getter]
     fn displacement(&self, py: Python<'_>) -> PyResult<Py<PyArrayDyn<f64>>> {
         Self::vectors(py, self.inspection.object_nodes.iter().map(|node| (node.position - node.rest).to_array()))

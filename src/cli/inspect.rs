@@ -106,9 +106,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
     }
     let warnings = outside(&chain, &scene.grid, q);
     warnings.iter().for_each(|warning| tell(format_args!("haptize: note: {warning}")));
-    let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(q)])?;
+    let model = Model::at(&object, &chain, scene.contact, &JointVector::from_slice(q))?;
     let dataset = dataset.as_ref();
-    let solved = Inspection::new(&model, q);
+    let solved = Inspection::new(&model, q)?;
     let page = match &arguments.html {
         Some(file) => {
             let title = arguments.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -146,7 +146,7 @@ struct Inspected {
     clearance: Option<Clearance>,
     #[serde(flatten)]
     body: Body,
-    /// Where a lattice fills the object: the error that it makes.
+    /// Where a lattice fills the object, and is touched: the error that it makes there.
     #[serde(skip_serializing_if = "Option::is_none")]
     lattice: Option<LatticeError>,
     /// How much a contact point feels the mesh, where the compliance covers a facet.
@@ -331,7 +331,7 @@ fn page(
     // Of all nodes, where the solver needs those alone that the arm may reach.
     let mut loads = vec![DVec3::ZERO; object.rest.len()];
     forces.iter().for_each(|at| loads[at.node as usize] = at.force);
-    let displacement = object.mechanics()?.displacement_under(&loads);
+    let displacement = object.displacement_under(&loads)?;
     let nodes = object.rest.iter().zip(&displacement).map(|(rest, u)| *rest + *u).collect();
     let instant = Instant { time: 0.0, nodes, contact_nodes: forces.len() as u32, forces, pose };
     let joints = || chain.joints.iter().map(|joint| (joint.name.as_str(), joint.kind.unit()));

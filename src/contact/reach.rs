@@ -11,7 +11,7 @@ use super::geometry::RestSurface;
 use super::law::rounded::Rounded;
 use super::model::{Model, greatest_radius};
 use super::thin_parts;
-use super::{NodeTree, Proximity};
+use super::{NodeTree, Proximity, Solver, Status};
 use crate::object::{Compliance, Object};
 use crate::proxy::Chain;
 use crate::scene::{ContactLaw, ContactSpec};
@@ -48,7 +48,7 @@ impl<'a> Model<'a> {
 
     /// The same for contact at or near `configurations`: of an object with more than [`Model::WHOLE`] surface nodes,
     /// only the compliance of those within the proxy's reach is formed, and none where there is no configuration. One
-    /// that reaches farther is flagged [`super::Status::Overflow`].
+    /// that reaches farther is flagged [`Status::Overflow`].
     ///
     /// # Errors
     /// When the compliance would not fit in memory.
@@ -66,13 +66,35 @@ impl<'a> Model<'a> {
         Ok(model)
     }
 
+    /// The same for `q` alone: of any object only the compliance of what the proxy reaches there is formed, unless an
+    /// earlier run has kept that of all nodes, or `q` is flagged [`Status::Overflow`] with less.
+    ///
+    /// # Errors
+    /// As [`Model::reaching`].
+    pub fn at(object: &'a Object, chain: &'a Chain, contact: ContactSpec, q: &JointVector) -> Result<Self, Error> {
+        let configurations = std::slice::from_ref(q);
+        if object.surface_nodes > Self::WHOLE || Compliance::is_kept(object) {
+            return Self::reaching(object, chain, contact, configurations);
+        }
+        let mut model = Self::reaching(object, chain, contact, &[])?;
+        model.form(configurations, false)?;
+        if Solver::new(&model).solve(q).status == Status::Overflow {
+            model.reach(configurations)?;
+        }
+        Ok(model)
+    }
+
     /// Forms what contact at or near `configurations` needs, in the place of what there is.
     ///
     /// # Errors
     /// As [`Model::reaching`].
     pub fn reach(&mut self, configurations: &[JointVector]) -> Result<(), Error> {
+        self.form(configurations, self.object.surface_nodes <= Self::WHOLE && !configurations.is_empty())
+    }
+
+    /// The same, of all nodes if `is_whole`.
+    fn form(&mut self, configurations: &[JointVector], is_whole: bool) -> Result<(), Error> {
         let object = self.object;
-        let is_whole = object.surface_nodes <= Self::WHOLE && !configurations.is_empty();
         if is_whole {
             self.take_compliance(Compliance::on(object, (0..object.surface_nodes as u32).collect())?);
         }
@@ -239,7 +261,6 @@ pub(crate) fn covers(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{Solver, Status};
     use crate::object::{Compliance, Object};
     use crate::proxy::Chain;
     use crate::scene::Scene;

@@ -55,16 +55,18 @@ impl Compliance {
             return Ok(Arc::new(Self::from_parts(nodes, object.surface_nodes, 3, Vec::new())));
         }
         Self::check(object, nodes.len())?;
-        let key = [&object.key[..], b"compliance", bytemuck::cast_slice(&nodes)].concat();
-        let kept = Cache::used().and_then(|cache| cache.find(&key));
-        if let (Some(entries), Some(rows_per_node)) = (kept, object.proven) {
-            let entries = bytemuck::pod_collect_to_vec(&entries);
-            return Ok(Arc::new(Self::from_parts(nodes, object.surface_nodes, rows_per_node, entries)));
-        }
-        let mechanics = object.mechanics()?;
-        let formed = Self::of(&mechanics.factor, &mechanics.attachment, object.surface_nodes, nodes);
-        Cache::used().into_iter().for_each(|cache| cache.keep(&key, bytemuck::cast_slice(&formed.entries)));
-        Ok(Arc::new(formed))
+        let entries = Cache::numbers(&key(object, &nodes), || {
+            let mechanics = object.mechanics()?;
+            Ok::<_, Error>(entries(&mechanics.factor, &mechanics.attachment, &nodes))
+        })?;
+        Ok(Arc::new(Self::from_parts(nodes, object.surface_nodes, rows_per_node(object)?, entries)))
+    }
+
+    /// Whether an earlier run has kept the compliance on all surface nodes of `object`.
+    #[must_use]
+    pub fn is_kept(object: &Object) -> bool {
+        let nodes: Vec<u32> = (0..object.surface_nodes as u32).collect();
+        Cache::used().is_some_and(|cache| cache.holds(&key(object, &nodes)))
     }
 
     fn from_parts(nodes: Vec<u32>, surface_nodes: usize, rows_per_node: usize, entries: Vec<f64>) -> Self {
@@ -78,9 +80,7 @@ impl Compliance {
     /// # Errors
     /// When it would not.
     pub fn check(object: &Object, nodes: usize) -> Result<(), Error> {
-        let rows_per_node =
-            object.proven.map_or_else(|| Ok(object.mechanics()?.factor.rows_per_node()), Ok::<_, Error>)?;
-        let order = nodes.saturating_mul(rows_per_node);
+        let order = nodes.saturating_mul(rows_per_node(object)?);
         let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
         if bytes <= memory::SMALL {
             return Ok(());
@@ -105,15 +105,8 @@ impl Compliance {
 
     /// The part of N K^-1 N^T at `covered` ones of the first `surface_nodes` nodes; N is `attachment`.
     fn of(factor: &Factor, attachment: &Attachment, surface_nodes: usize, covered: Vec<u32>) -> Self {
-        let rows_per_node = factor.rows_per_node();
-        // Rows of N, one for each coordinate of a node.
-        let row = |k: usize| {
-            let nodes = attachment.row(covered[k / rows_per_node] as usize).iter();
-            nodes.map(|&(node, weight)| (rows_per_node * node as usize + k % rows_per_node, weight)).collect()
-        };
-        let rows: Vec<Vec<(usize, f64)>> = (0..rows_per_node * covered.len()).map(row).collect();
-        let entries = factor.condensed(&rows);
-        Self::from_parts(covered, surface_nodes, rows_per_node, entries)
+        let entries = entries(factor, attachment, &covered);
+        Self::from_parts(covered, surface_nodes, factor.rows_per_node(), entries)
     }
 
     /// Whether all surface nodes are covered.
@@ -151,6 +144,28 @@ impl Compliance {
         let row = |a: usize| DVec3::from_slice(&rows[a * self.order() + 3 * j..][..3]);
         DMat3::from_cols(row(0), row(1), row(2)).transpose()
     }
+}
+
+/// Under what the compliance of `object` on `nodes` is kept.
+fn key(object: &Object, nodes: &[u32]) -> Vec<u8> {
+    [&object.key[..], b"compliance", bytemuck::cast_slice(nodes)].concat()
+}
+
+/// Rows and columns per node of what `object` resists by.
+fn rows_per_node(object: &Object) -> Result<usize, Error> {
+    object.proven.map_or_else(|| Ok(object.mechanics()?.factor.rows_per_node()), Ok)
+}
+
+/// The entries of N K^-1 N^T at the nodes `covered`, row by row.
+fn entries(factor: &Factor, attachment: &Attachment, covered: &[u32]) -> Vec<f64> {
+    let rows_per_node = factor.rows_per_node();
+    // Rows of N, one for each coordinate of a node.
+    let row = |k: usize| {
+        let nodes = attachment.row(covered[k / rows_per_node] as usize).iter();
+        nodes.map(|&(node, weight)| (rows_per_node * node as usize + k % rows_per_node, weight)).collect()
+    };
+    let rows: Vec<Vec<(usize, f64)>> = (0..rows_per_node * covered.len()).map(row).collect();
+    factor.condensed(&rows)
 }
 
 #[cfg(test)]

@@ -234,6 +234,20 @@ impl Object {
         Ok(self.mechanics.get_or_init(|| formed))
     }
 
+    /// [`Mechanics::displacement_under`] that an earlier run has kept, or that is found, and kept for later ones.
+    ///
+    /// # Errors
+    /// As for [`Object::mechanics`].
+    pub fn displacement_under(&self, forces: &[DVec3]) -> Result<Vec<DVec3>, Error> {
+        let loads: Vec<f64> = forces.iter().flat_map(DVec3::to_array).collect();
+        let key = [&self.key[..], b"displacement", bytemuck::cast_slice(&loads)].concat();
+        let moved = Cache::numbers(&key, || {
+            let moved = self.mechanics()?.displacement_under(forces);
+            Ok::<_, Error>(moved.iter().flat_map(DVec3::to_array).collect())
+        })?;
+        Ok(moved.chunks_exact(3).map(DVec3::from_slice).collect())
+    }
+
     /// All that its compliance is made of, byte for byte.
     #[must_use]
     pub fn key(&self) -> &[u8] {

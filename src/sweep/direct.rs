@@ -70,7 +70,7 @@ impl Direct {
             ));
         }
         check_rows(q, joints)?;
-        Ok(Inspection::new(self.model(), q))
+        Inspection::new(self.model(), q)
     }
 
     /// Torques and statuses of many configurations, joint fastest as they are, on all cores (N m or N). Each is solved

@@ -1,5 +1,6 @@
 //! One configuration in full: what equation (2) says of it, for the eye and for other programs.
 
+use crate::Error;
 use crate::contact::{Equilibrium, Model, Solver};
 use glam::DVec3;
 use serde::Serialize;
@@ -60,7 +61,7 @@ pub struct Contact {
 pub struct ObjectNode {
     /// n0 (m).
     pub rest: DVec3,
-    /// n; not a number where the arm reaches too little of a large body for its compliance to be formed there (m).
+    /// n (m).
     pub position: DVec3,
     /// Contact force f_j on it (N).
     pub force: DVec3,
@@ -68,24 +69,23 @@ pub struct ObjectNode {
 
 impl Inspection {
     /// Solves the configuration `q` and returns every detail.
-    #[must_use]
-    pub fn new(model: &Model<'_>, q: &[f64]) -> Self {
+    ///
+    /// # Errors
+    /// When the compliance of `model` is not that of all nodes, and there is no memory to find how far they move.
+    pub fn new(model: &Model<'_>, q: &[f64]) -> Result<Self, Error> {
         let mut solver = Solver::new(model);
         let equilibrium = solver.solve(q);
         let (object, chain) = (model.object, model.chain);
-        let rest = &object.rest[..object.surface_nodes];
-        let mut object_nodes: Vec<ObjectNode> = rest
-            .iter()
-            .zip(solver.displacement().chunks_exact(3))
-            .map(|(&rest, u)| ObjectNode { rest, position: rest + DVec3::from_slice(u), force: DVec3::ZERO })
-            .collect();
-        if !equilibrium.forces.is_empty() {
-            let unknown = |node: &usize| model.compliance.place(*node as u32).is_none();
-            (0..object_nodes.len()).filter(unknown).for_each(|node| object_nodes[node].position = DVec3::NAN);
-        }
-        for contact in &equilibrium.forces {
-            object_nodes[contact.node as usize].force = contact.force;
-        }
+        let mut forces = vec![DVec3::ZERO; object.rest.len()];
+        equilibrium.forces.iter().for_each(|contact| forces[contact.node as usize] = contact.force);
+        let displacement = if equilibrium.forces.is_empty() || model.compliance.is_whole() {
+            solver.displacement().chunks_exact(3).map(DVec3::from_slice).collect()
+        } else {
+            object.displacement_under(&forces)?
+        };
+        let nodes = object.rest.iter().zip(displacement).zip(forces).take(object.surface_nodes);
+        let object_nodes: Vec<ObjectNode> =
+            nodes.map(|((&rest, moved), force)| ObjectNode { rest, position: rest + moved, force }).collect();
         let pose = solver.pose();
         let proxy_nodes =
             chain.nodes.iter().zip(&pose.nodes).enumerate().map(|(node, (specified, &position))| ProxyNode {
@@ -99,7 +99,7 @@ impl Inspection {
             });
         let proxy_nodes = proxy_nodes.collect();
         let Equilibrium { status, iterations, residual, energy, gap, torque, .. } = equilibrium;
-        Self {
+        Ok(Self {
             q: q.to_vec(),
             status: format!("{status:?}").to_lowercase(),
             iterations,
@@ -110,7 +110,7 @@ impl Inspection {
             dent: dent(&object_nodes),
             proxy_nodes,
             object_nodes,
-        }
+        })
     }
 }
 
@@ -132,7 +132,7 @@ fn dent(nodes: &[ObjectNode]) -> Option<f64> {
         let way = node.rest - heaviest.rest;
         (way.length(), shared(way) / whole)
     };
-    let mut ways: Vec<(f64, f64)> = nodes.iter().map(of).filter(|(_, share)| share.is_finite()).collect();
+    let mut ways: Vec<(f64, f64)> = nodes.iter().map(of).collect();
     ways.sort_by(|a, b| a.0.total_cmp(&b.0));
     let within = ways.iter().filter(|(_, share)| *share > 1.0 / std::f64::consts::E).count();
     match ways.get(within) {

@@ -1,48 +1,23 @@
 //! Contact before a rounded surface: exact derivatives, and nothing leaps where the nearest side of a body changes.
 
-use crate::rest::{contact, gradient_error, tangent_error, work_around};
+use crate::common::cubes;
+use crate::rest::{contact, gradient_error, greatest_step, tangent_error, work_around};
 use glam::DVec3;
-use haptize::JointVector;
 use haptize::contact::{Model, Solver, Status};
 use haptize::fixtures::bodies;
 use haptize::object::Object;
 use haptize::proxy::Chain;
 use haptize::scene::{ContactSpec, ContactSurface, ProxyNodeSpec};
-use std::collections::BTreeMap;
 
-/// Sides of the box (m), and into how many parts each is divided.
+/// Sides of the box (m).
 const SIDES: [f64; 3] = [0.1, 0.08, 0.06];
-const PARTS: [i32; 3] = [10, 8, 6];
 
 /// Length over which contact is rounded (m).
 const LENGTH: f64 = 0.008;
 
 /// A box around the origin.
-fn cuboid() -> Object {
-    let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
-    let mut nodes = Vec::new();
-    let mut triangles = Vec::new();
-    for (axis, &parts) in PARTS.iter().enumerate() {
-        let (across, along) = ((axis + 1) % 3, (axis + 2) % 3);
-        for (side, u, v) in
-            (0..2).flat_map(|side| (0..PARTS[across]).flat_map(move |u| (0..PARTS[along]).map(move |v| (side, u, v))))
-        {
-            let mut corners = [(u, v), (u + 1, v), (u + 1, v + 1), (u, v + 1)].map(|(u, v)| {
-                let mut at = [side * parts; 3];
-                (at[across], at[along]) = (u, v);
-                *numbers.entry(at).or_insert_with(|| {
-                    let place = |a: usize| SIDES[a] * (f64::from(at[a]) / f64::from(PARTS[a]) - 0.5);
-                    nodes.push(DVec3::new(place(0), place(1), place(2)));
-                    nodes.len() as u32 - 1
-                })
-            });
-            if side == 0 {
-                corners.reverse();
-            }
-            let [a, b, c, d] = corners;
-            triangles.extend([[a, b, c], [a, c, d]]);
-        }
-    }
+pub fn cuboid() -> Object {
+    let (nodes, triangles) = cubes::surface(SIDES.map(|side| (100.0 * side).round() as i32), 0.01, |_| true);
     bodies::object(nodes, triangles).unwrap()
 }
 
@@ -50,7 +25,7 @@ fn cuboid() -> Object {
 /// 1e5 times its square.
 const STEP: f64 = 2e-7;
 
-fn rounded(kc: f64) -> ContactSpec {
+pub fn rounded(kc: f64) -> ContactSpec {
     ContactSpec { round: Some(LENGTH), ..contact(kc) }
 }
 
@@ -89,19 +64,6 @@ fn node() -> Chain {
     bodies::gantry(vec![ProxyNodeSpec { position: DVec3::ZERO, radius: 0.0, length: 0.0 }])
 }
 
-/// The greatest change of the force from one of `count` places to the next on the way through the box from `from` to
-/// `to`, over the greatest force.
-fn greatest_step(solver: &mut Solver<'_>, from: DVec3, to: DVec3, count: u32) -> f64 {
-    let forces: Vec<DVec3> = (0..=count)
-        .map(|k| {
-            let q = from.lerp(to, f64::from(k) / f64::from(count));
-            DVec3::from_slice(&solver.solve(&JointVector::from_slice(&q.to_array())).torque)
-        })
-        .collect();
-    let greatest = forces.iter().map(|force| force.length()).fold(0.0, f64::max);
-    forces.windows(2).map(|pair| pair[0].distance(pair[1])).fold(0.0, f64::max) / greatest
-}
-
 /// Where the foot goes from one side to another a force with sharp edges leaps: its greatest step does not shrink with
 /// the steps. A rounded one has no leap.
 #[test]
@@ -115,11 +77,13 @@ fn nothing_leaps_where_the_nearest_side_changes() {
         (DVec3::new(0.045, 0.034, 0.003), DVec3::new(0.032, 0.036, 0.027)),
         (DVec3::new(0.02, 0.02, 0.02), DVec3::new(0.06, 0.05, 0.04)),
     ] {
-        let steps = |solver: &mut Solver<'_>| [400, 1600].map(|count| greatest_step(solver, from, to, count));
+        let [from, to] = [from, to].map(|place: DVec3| place.to_array());
+        let steps =
+            |solver: &mut Solver<'_>| [400, 1600].map(|count| greatest_step(solver, [&from, &to], &[1.0; 3], count));
         let (sharp, round) = (steps(&mut sharp), steps(&mut round));
         println!("sharp {sharp:.4?}, round {round:.4?}");
         assert!(round[1] < 0.3 * round[0] && round[1] < 0.02, "{round:?}");
-        if to.z < 0.03 {
+        if to[2] < 0.03 {
             assert!(sharp[1] > 0.9 * sharp[0] && sharp[1] > 0.1, "{sharp:?}");
         }
     }

@@ -240,7 +240,7 @@ fn a_finger_finds_the_nodule() {
     let stroke: Vec<JointVector> =
         (-10..=10).map(|k| JointVector::from_slice(&[0.02 * f64::from(k), 0.05, 0.0])).collect();
     let model = Model::reaching(&object, &chain, scene.contact, &stroke).unwrap();
-    let found = stroke.iter().map(|q| Inspection::new(&model, q));
+    let found = stroke.iter().map(|q| Inspection::new(&model, q).unwrap());
     let torques: Vec<f64> = found.map(|inspection| inspection.torque[1].abs()).collect();
     let (most, place) = torques.iter().zip(&stroke).max_by(|a, b| a.0.total_cmp(b.0)).unwrap();
     let yaw = place[0];

@@ -52,7 +52,7 @@ fn an_inspection_is_complete_enough_to_recompute_the_torque() {
     let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
     // At rest the force on the arm has a part along the surface that does not act on the object.
     let model = Model::new(&object, &chain, ContactSpec { law: ContactLaw::Following, ..scene.contact });
-    let inspection = Inspection::new(&model, &[0.05, 0.045]);
+    let inspection = Inspection::new(&model, &[0.05, 0.045]).unwrap();
     assert_eq!((inspection.status.as_str(), inspection.proxy_nodes.len()), ("contact", 3));
     assert_eq!(inspection.object_nodes.len(), object.surface_nodes);
     let mut torque = [0.0; 2];
@@ -67,25 +67,29 @@ fn an_inspection_is_complete_enough_to_recompute_the_torque() {
     assert!((pushed + pushing).length() < 1e-12 * pushed.length());
 }
 
+/// Whatever the compliance covers.
 #[test]
-fn what_a_large_body_does_out_of_reach_is_not_known() {
-    // Its compliance is formed near the arm alone.
-    let large = SCENE.replace("rings = 4, segments = 5", "rings = 46, segments = 48");
-    let scene = Scene::parse(&large, "large.toml").unwrap();
+fn every_node_of_a_body_is_known_to_move_as_it_does() {
+    let scene =
+        Scene::parse(&SCENE.replace("rings = 4, segments = 5", "rings = 20, segments = 20"), "fine.toml").unwrap();
     let (object, chain) = (Object::build(&scene.object).unwrap(), Chain::new(&scene.proxy));
-    let inspect = |q: [f64; 2]| {
-        let model = Model::reaching(&object, &chain, scene.contact, &[JointVector::from_slice(&q)]).unwrap();
-        Inspection::new(&model, &q)
-    };
-    let pressed = inspect([0.05, 0.045]);
-    let (known, unknown): (Vec<&ObjectNode>, Vec<&ObjectNode>) =
-        pressed.object_nodes.iter().partition(|node| node.position.is_finite());
-    assert!(!known.is_empty() && !unknown.is_empty(), "{} and {}", known.len(), unknown.len());
-    assert!(unknown.iter().all(|node| node.force == DVec3::ZERO));
-    let deepest = known.iter().map(|node| node.position.distance(node.rest)).fold(0.0, f64::max);
-    assert!(deepest > 1e-4 && pressed.dent.is_some_and(|dent| dent > 0.0), "{deepest} {:?}", pressed.dent);
-    let free = inspect([0.05, 0.0]);
-    assert!(free.status == "free" && free.object_nodes.iter().all(|node| node.position == node.rest));
+    let whole = Model::new(&object, &chain, scene.contact);
+    let pressed = [0.05, 0.045];
+    for (q, touches) in [(pressed, true), ([0.05, 0.0], false)] {
+        let near = Model::at(&object, &chain, scene.contact, &JointVector::from_slice(&q)).unwrap();
+        assert!(!near.compliance.is_whole());
+        let [near, whole] = [&near, &whole].map(|model| Inspection::new(model, &q).unwrap());
+        assert_eq!((near.status == "contact", near.dent.is_some()), (touches, touches));
+        assert!(relative_error(&near.torque, &whole.torque) < 1e-12);
+        let off = |(a, b): (&ObjectNode, &ObjectNode)| a.position.distance(b.position);
+        let moved =
+            |of: &Inspection| of.object_nodes.iter().map(|at| at.position.distance(at.rest)).fold(0.0, f64::max);
+        let worst = near.object_nodes.iter().zip(&whole.object_nodes).map(off).fold(0.0, f64::max);
+        assert!(worst <= 1e-12 * moved(&whole) && touches == (moved(&near) > 1e-4), "{worst} of {}", moved(&whole));
+    }
+    // What reaches farther than was expected is solved with all nodes.
+    let deep = Model::at(&object, &chain, scene.contact, &JointVector::from_slice(&[0.05, 0.09])).unwrap();
+    assert_eq!(Inspection::new(&deep, &[0.05, 0.09]).unwrap().status, "contact");
 }
 
 #[test]

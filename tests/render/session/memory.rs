@@ -58,7 +58,7 @@ fn the_loop_relaxes_as_an_object_every_node_of_which_remembers() {
         let size = |tick: &&Tick| tick.sample.torque.norm();
         let deepest = trace.ticks.iter().max_by(|a, b| size(a).total_cmp(&size(b))).unwrap();
         let solved = LiveScene::new(plain).unwrap();
-        let dent = Inspection::new(solved.direct().model(), &deepest.proxy).dent.unwrap();
+        let dent = Inspection::new(solved.direct().model(), &deepest.proxy).unwrap().dent.unwrap();
         let scene = relaxing(&text, &path, &format!("dent = {dent}"));
         let errors = [true, false].map(|is_press| error(&scene, is_press));
         println!(
