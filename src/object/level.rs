@@ -107,7 +107,7 @@ impl Level {
         (at - FACE * point.normal).floor().as_ivec3().clamp(IVec3::ZERO, self.counts - 1)
     }
 
-    /// What each cube holds of the closed surface, if anything. `facing`: the areas of the surface in it across each
+    /// What each cube holds of the inside of the closed surface, if anything. `facing`: the areas of the surface in it across each
     /// axis.
     pub fn fill(&self, nodes: &[DVec3], triangles: &[[u32; 3]], facing: &[DVec3]) -> Vec<Option<Filling>> {
         // Where no surface is, along z.
@@ -118,11 +118,10 @@ impl Level {
         let whole = |stretches: &[Stretch]| {
             stretches.len() == LINES * LINES && stretches.iter().all(|(_, ends)| *ends == [0.0, 1.0])
         };
-        let filling = |((stretches, facing), axis): ((Vec<Stretch>, &DVec3), usize)| {
-            let is_held = !stretches.is_empty() || *facing != DVec3::ZERO;
-            is_held.then(|| Filling { axis, inside: (!whole(&stretches)).then_some(stretches) })
+        let filling = |(stretches, axis): (Vec<Stretch>, usize)| {
+            (!stretches.is_empty()).then(|| Filling { axis, inside: (!whole(&stretches)).then_some(stretches) })
         };
-        inside.into_iter().zip(facing).zip(axes).map(filling).collect()
+        inside.into_iter().zip(axes).map(filling).collect()
     }
 
     /// Adds to `inside` what lies inside the surface, of those cubes whose lines run along `axis`.
