@@ -1,15 +1,25 @@
-//! The threads that share work out. The engine takes rayon's, of which there are one set for a process; a process that
-//! was forked has none of them, but would wait for them for ever: there, a pool of its own takes their place.
+//! The threads that share work out. The engine takes rayon's, of which there are one set for a process. A process that
+//! was forked has none of them, but would wait for them for ever, and they are begun but once: where they are missing, a
+//! pool of its own takes their place.
 
+use haptize::{Error, threads};
 use pyo3::{exceptions::PyOSError, prelude::*, types::PyDict};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::{
+    error::Error as _,
     ptr::null_mut,
-    sync::atomic::{AtomicBool, AtomicPtr, Ordering},
+    sync::{
+        Once,
+        atomic::{AtomicBool, AtomicPtr, Ordering},
+    },
 };
 
-/// Whether this process was forked from one that had loaded the package.
-static FORKED: AtomicBool = AtomicBool::new(false);
+/// Whether this process lacks rayon's threads: it was forked from one that had loaded the package, or the system gave
+/// none.
+static LACKING: AtomicBool = AtomicBool::new(false);
+
+/// The beginning of rayon's threads.
+static BEGUN: Once = Once::new();
 
 /// The pool of a process that was forked, once it is needed; it lives as long as the process. No lock: one that another
 /// thread held at the fork would never be released.
@@ -22,16 +32,25 @@ pub fn detach<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyRes
 
 /// Does `work`, sharing it out among threads of this process.
 pub fn run<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    if !FORKED.load(Ordering::Acquire) {
-        return Ok(work());
+    if !LACKING.load(Ordering::Acquire) {
+        BEGUN.call_once(|| {
+            // Without a cause, they were there already.
+            let refused = ThreadPoolBuilder::new().build_global().is_err_and(|why| why.source().is_some());
+            LACKING.fetch_or(refused, Ordering::AcqRel);
+        });
     }
-    Ok(pool()?.install(work))
+    if LACKING.load(Ordering::Acquire) { Ok(pool()?.install(work)) } else { Ok(work()) }
+}
+
+/// The exception of threads that the system does not give.
+pub fn refused(why: Error) -> PyErr {
+    PyOSError::new_err(why.to_string())
 }
 
 fn pool() -> PyResult<&'static ThreadPool> {
     let mut there = POOL.load(Ordering::Acquire);
     if there.is_null() {
-        let made = ThreadPoolBuilder::new().build().map_err(|error| PyOSError::new_err(error.to_string()))?;
+        let made = ThreadPoolBuilder::new().build().map_err(|why| refused(threads::refused(why)))?;
         let made = Box::into_raw(Box::new(made));
         there = match POOL.compare_exchange(null_mut(), made, Ordering::AcqRel, Ordering::Acquire) {
             Ok(_) => made,
@@ -51,7 +70,7 @@ fn pool() -> PyResult<&'static ThreadPool> {
 fn after_fork() {
     // A pool that the parent had is left: its threads are not here.
     POOL.store(null_mut(), Ordering::Release);
-    FORKED.store(true, Ordering::Release);
+    LACKING.store(true, Ordering::Release);
 }
 
 /// Has the interpreter tell of forks, where there are such.

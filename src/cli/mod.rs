@@ -69,6 +69,7 @@ use crate::{
     names,
     render::trace::Tick,
     sweep::{OTHER_ADAPTER, remedied},
+    threads,
 };
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::{
@@ -304,9 +305,7 @@ fn printable(text: &str) -> Cow<'_, str> {
 
 /// Starts the threads that all work shares: where the system gives none, this is an error here and a panic later.
 fn start_threads() -> Result<(), Failure> {
-    let remedy = "close other programs, or raise the limits on processes and memory (ulimit -u, ulimit -v)";
-    let started = rayon::ThreadPoolBuilder::new().build_global();
-    started.map_err(|error| format!("no threads to work with: {error}; {remedy}").into())
+    Ok(rayon::ThreadPoolBuilder::new().build_global().map_err(threads::refused)?)
 }
 
 /// Prints one half of `report`. A reader that has seen enough (`haptize info ... | head`) is no failure.

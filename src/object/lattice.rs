@@ -178,6 +178,7 @@ impl Lattice {
                 "the object is too thin for cubes of {} m: make object.elasticity.cell smaller, or refine the surface",
                 self.levels[0].size
             )
+            .about("object.elasticity.cell")
         })
     }
 

@@ -63,7 +63,8 @@ impl Level {
             return Err(error!(
                 "cells of {size} m make {cubes:.0} cubes of an object that is {length:.3} m long, more than {MAX_CUBES:.0}: \
                  make object.elasticity.cell larger, or scale a mesh that was drawn in millimetres"
-            ));
+            )
+            .about("object.elasticity.cell"));
         }
         // In the middle, so that a box of a whole number of cubes is met exactly.
         let origin = low.midpoint(high) - 0.5 * size * counts;
