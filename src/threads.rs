@@ -2,10 +2,27 @@
 
 use crate::{Error, error};
 use std::{
+    error::Error as _,
     fmt::Display,
     fs,
+    sync::OnceLock,
     thread::{Builder, JoinHandle, Scope, ScopedJoinHandle},
 };
+
+/// Begins the threads that all work shares, unless they are there: where the system gives none, this is an error here
+/// and a panic later. They are begun but once.
+///
+/// # Errors
+/// As for [`spawn`].
+pub fn begin_shared() -> Result<(), Error> {
+    static BEGUN: OnceLock<Result<(), Error>> = OnceLock::new();
+    let begin = || match rayon::ThreadPoolBuilder::new().build_global() {
+        // Without a cause, they are there.
+        Err(why) if why.source().is_some() => Err(refused(why)),
+        _ => Ok(()),
+    };
+    BEGUN.get_or_init(begin).clone()
+}
 
 /// Begins `work` in a thread called `name`.
 ///

@@ -6,22 +6,14 @@ use haptize::{Error, threads};
 use pyo3::{exceptions::PyOSError, prelude::*, types::PyDict};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::{
-    error::Error as _,
     ptr::null_mut,
-    sync::{
-        Once,
-        atomic::{AtomicBool, AtomicPtr, Ordering},
-    },
+    sync::atomic::{AtomicBool, AtomicPtr, Ordering},
 };
 
-/// Whether this process lacks rayon's threads: it was forked from one that had loaded the package, or the system gave
-/// none.
-static LACKING: AtomicBool = AtomicBool::new(false);
+/// Whether this process was forked from one that had loaded the package.
+static FORKED: AtomicBool = AtomicBool::new(false);
 
-/// The beginning of rayon's threads.
-static BEGUN: Once = Once::new();
-
-/// The pool of a process that was forked, once it is needed; it lives as long as the process. No lock: one that another
+/// The pool of a process without these threads, once it is needed; it lives as long as the process. No lock: one that another
 /// thread held at the fork would never be released.
 static POOL: AtomicPtr<ThreadPool> = AtomicPtr::new(null_mut());
 
@@ -32,14 +24,10 @@ pub fn detach<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyRes
 
 /// Does `work`, sharing it out among threads of this process.
 pub fn run<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    if !LACKING.load(Ordering::Acquire) {
-        BEGUN.call_once(|| {
-            // Without a cause, they were there already.
-            let refused = ThreadPoolBuilder::new().build_global().is_err_and(|why| why.source().is_some());
-            LACKING.fetch_or(refused, Ordering::AcqRel);
-        });
+    if FORKED.load(Ordering::Acquire) || threads::begin_shared().is_err() {
+        return Ok(pool()?.install(work));
     }
-    if LACKING.load(Ordering::Acquire) { Ok(pool()?.install(work)) } else { Ok(work()) }
+    Ok(work())
 }
 
 /// The exception of threads that the system does not give.
@@ -70,7 +58,7 @@ fn pool() -> PyResult<&'static ThreadPool> {
 fn after_fork() {
     // A pool that the parent had is left: its threads are not here.
     POOL.store(null_mut(), Ordering::Release);
-    LACKING.store(true, Ordering::Release);
+    FORKED.store(true, Ordering::Release);
 }
 
 /// Has the interpreter tell of forks, where there are such.
