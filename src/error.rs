@@ -24,6 +24,8 @@ const EXCERPT_LEAD: usize = 60;
 pub struct Error {
     kind: ErrorKind,
     location: Option<Location>,
+    /// See [`Error::key`].
+    key: Option<String>,
     text: String,
 }
 
@@ -59,7 +61,7 @@ pub struct Location {
 impl Error {
     /// Returns the error that `text` tells.
     pub fn new(text: impl Into<String>) -> Self {
-        Self { kind: ErrorKind::Other, location: None, text: text.into() }
+        Self { kind: ErrorKind::Other, location: None, key: None, text: text.into() }
     }
 
     /// Returns what is wrong with the file at `path`.
@@ -110,6 +112,11 @@ impl Error {
         Self { kind, ..self }
     }
 
+    /// Returns the same error, which lies at `key` of a scene, unless it names one already.
+    pub(crate) fn about(self, key: impl Into<String>) -> Self {
+        Self { key: self.key.or_else(|| Some(key.into())), ..self }
+    }
+
     /// Returns the same error; its text says first what it befell.
     pub(crate) fn within(self, context: impl Display) -> Self {
         Self { text: format!("{context}: {}", self.text), ..self }
@@ -119,6 +126,11 @@ impl Error {
     #[must_use]
     pub fn kind(&self) -> ErrorKind {
         self.kind
+    }
+
+    /// Returns the key of a scene at which it lies, with dots between its parts, where whoever found it has not the text.
+    pub(crate) fn key(&self) -> Option<&str> {
+        self.key.as_deref()
     }
 
     /// Returns where it lies, where that is a file.

@@ -119,6 +119,7 @@ mod joint_vector;
 pub mod memory;
 mod names;
 mod random;
+pub mod threads;
 mod toml_text;
 mod vtk;
 mod xml;

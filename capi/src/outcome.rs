@@ -1,6 +1,6 @@
 //! How a call ended: a code, and where there is more to say a message in the caller's buffer.
 
-use haptize::{Error, ErrorKind};
+use haptize::{Error, ErrorKind, threads};
 use std::{
     ffi::{CStr, c_char},
     io::{Cursor, Write},
@@ -66,6 +66,7 @@ pub fn guarded(work: impl FnOnce() -> hz_code) -> hz_code {
 /// `text` is NULL or points to `size` bytes that may be written.
 pub unsafe fn told(text: *mut c_char, size: usize, work: impl FnOnce() -> Result<String, Failure>) -> hz_code {
     let mut code = hz_code::HZ_DEFECT;
+    let work = || threads::begin_shared().map_err(Failure::from).and_then(|()| work());
     let message = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(remarks)) => {
             code = hz_code::HZ_OK;

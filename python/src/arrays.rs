@@ -1,8 +1,8 @@
 //! Arrays in and out: configurations from whatever NumPy takes for numbers, results into the caller's array or a new
 //! one.
 
-use crate::threads;
-use haptize::JointVector;
+use crate::{errors, threads};
+use haptize::{JointVector, field::check_rows};
 use numpy::{
     Element, PyArray, PyArray1, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
@@ -14,9 +14,13 @@ use pyo3::{
     prelude::*,
     types::PyDict,
 };
+use std::time::{Duration, Instant};
 
 /// Rows from which on other Python threads run meanwhile: a few microseconds of work.
 const MANY: usize = 32;
+
+/// How often signals are looked at meanwhile: well below what a person notices.
+const TURN: Duration = Duration::from_millis(50);
 
 /// Configurations, one in each row of the last axis, in C order.
 pub struct Configurations<'py> {
@@ -54,15 +58,18 @@ impl<'py> Configurations<'py> {
         self.shape().iter().product()
     }
 
-    /// Fills an array of `T`, for each configuration of the shape `row`, by `fill`. It is `out`, whose shape must be
-    /// right and which must not be `q`, or a new one. Many rows are filled while other threads of Python run.
+    /// Fills an array of `T`, for each configuration of the shape `row`, by `fill`, which takes the number of the first of
+    /// some configurations, these, and their results. The array is `out`, whose shape must be right and which must not be
+    /// `q`, or a new one. Many rows are filled while other threads of Python run, and Ctrl-C ends the call.
     pub fn fill<T: Element + Send>(
         &self,
         row: &[usize],
         out: Option<&Bound<'py, PyAny>>,
-        fill: impl FnOnce(&[f64], &mut [T]) -> PyResult<()> + Send,
+        fill: impl Fn(usize, &[f64], &mut [T]) -> PyResult<()> + Send + Sync,
     ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
         let py = self.array.py();
+        let (rows, joints) = (self.rows(), self.array.shape().last().copied().unwrap_or_default());
+        check_rows(self.numbers()?, joints).map_err(errors::rows)?;
         let shape = [self.shape(), row].concat();
         let out = match out {
             None => PyArray::zeros(py, shape, false),
@@ -76,10 +83,29 @@ impl<'py> Configurations<'py> {
         };
         let mut writer = out.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))?;
         let (numbers, results) = (self.numbers()?, writer.as_slice_mut()?);
-        if self.rows() < MANY {
-            fill(numbers, results)?;
+        if rows < MANY {
+            fill(0, numbers, results)?;
         } else {
-            threads::detach(py, || fill(numbers, results))??;
+            let width = results.len() / rows;
+            let (mut done, mut piece) = (0, 1);
+            while done < rows {
+                threads::detach(py, || {
+                    let begun = Instant::now();
+                    while done < rows && begun.elapsed() < TURN {
+                        let (since, end) = (Instant::now(), rows.min(done + piece));
+                        fill(done, &numbers[done * joints..end * joints], &mut results[done * width..end * width])?;
+                        done = end;
+                        // Pieces come to take between a sixteenth of a turn and a half of it.
+                        piece = match since.elapsed() {
+                            took if took < TURN / 16 => 8 * piece,
+                            took if took > TURN / 2 => piece.div_ceil(8),
+                            _ => piece,
+                        };
+                    }
+                    PyResult::Ok(())
+                })??;
+                py.check_signals()?;
+            }
         }
         drop(writer);
         Ok(out)

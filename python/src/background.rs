@@ -1,13 +1,13 @@
 //! Work on a thread of its own, so that Ctrl-C ends a call at once, however long what is under way takes.
 
 use crate::threads;
+use haptize::threads::spawn;
 use pyo3::{panic::PanicException, prelude::*};
 use std::{
     sync::{
         atomic::{AtomicBool, Ordering},
         mpsc::{self, RecvTimeoutError, Sender},
     },
-    thread,
     time::{Duration, Instant},
 };
 
@@ -32,7 +32,7 @@ pub fn run<N: Send + 'static, T: Send + 'static>(
     mut hear: impl FnMut(N) -> PyResult<()>,
 ) -> PyResult<T> {
     let (sender, mut news) = mpsc::channel();
-    thread::Builder::new().name("haptize".into()).spawn(move || tell(work, &sender))?;
+    spawn("haptize", move || tell(work, &sender)).map_err(threads::refused)?;
     loop {
         let heard = &mut news;
         let happened = match py.detach(move || heard.recv_timeout(TURN)) {

@@ -40,7 +40,7 @@ impl Solver {
     /// Torques (N m; N) at many configurations, one in each row of the last axis of q, on all cores.
     fn torque<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let joints = self.direct.joints();
-        Configurations::new(q, joints)?.fill(&[joints], None, |q, out: &mut [f64]| {
+        Configurations::new(q, joints)?.fill(&[joints], None, |_, q, out: &mut [f64]| {
             let torques = threads::run(|| self.direct.torques(q))?;
             out.copy_from_slice(&torques.map_err(errors::rows)?.0);
             Ok(())

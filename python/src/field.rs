@@ -8,7 +8,7 @@ use crate::{
 use glam::DVec3;
 use haptize::{
     JointVector, dataset,
-    field::{TorqueField, check_rows, fill_rows},
+    field::{TorqueField, fill_rows},
     object::Object,
     render::{
         graphics::ContactForces,
@@ -27,7 +27,7 @@ use std::{path::PathBuf, sync::OnceLock};
 /// so, with fill_value torque, energy, gap and gradient are that number there.
 ///
 /// Each look-up takes a configuration q (rad; m), an array of one entry per joint, or any array of such in its last
-/// axis, and works on all cores. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a
+/// axis, and works on all cores; Ctrl-C ends it. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a
 /// field.
 #[pyclass(frozen, module = "haptize")]
 pub struct Field {
@@ -49,13 +49,14 @@ struct Body {
 
 impl Field {
     /// Answers for the rows of `q` that lie outside the grid, as was asked for: by an error, or by other numbers in
-    /// `out`.
-    fn bound(&self, q: &[f64], out: &mut [f64]) -> PyResult<()> {
+    /// `out`. `first`: number of the first row.
+    fn bound(&self, first: usize, q: &[f64], out: &mut [f64]) -> PyResult<()> {
         let joints = self.field.joints();
         let outside = |q: &[f64]| self.field.grid().fade(q) < 1.0;
         if self.bounds_error
             && let Some(row) = q.chunks_exact(joints).position(outside)
         {
+            let row = first + row;
             return Err(PyValueError::new_err(format!("configuration {row} is outside the grid (counted from 0)")));
         }
         if let Some(fill) = self.fill_value {
@@ -74,9 +75,9 @@ impl Field {
         write: impl Fn(&[f64], &mut [f64]) + Sync + Send,
     ) -> PyResult<Array<'py, f64>> {
         let joints = self.field.joints();
-        Configurations::new(q, joints)?.fill(row, None, |q, out: &mut [f64]| {
-            fill_rows(q, joints, out, write).map_err(errors::rows)?;
-            self.bound(q, out)
+        Configurations::new(q, joints)?.fill(row, None, |first, q, out: &mut [f64]| {
+            fill_rows(q, joints, out, &write).map_err(errors::rows)?;
+            self.bound(first, q, out)
         })
     }
 
@@ -105,8 +106,7 @@ impl Field {
     ) -> PyResult<Array<'py, f64>> {
         let Body { object, forces } = self.body(q.py())?;
         let (joints, nodes) = (self.field.joints(), object.surface_nodes);
-        Configurations::new(q, joints)?.fill(&[nodes, 3], None, |q, out: &mut [f64]| {
-            check_rows(q, joints).map_err(errors::rows)?;
+        Configurations::new(q, joints)?.fill(&[nodes, 3], None, |_, q, out: &mut [f64]| {
             for (q, out) in q.chunks_exact(joints).zip(out.chunks_exact_mut(3 * nodes)) {
                 let mut on_nodes = vec![DVec3::ZERO; object.rest.len()];
                 forces.at(q, self.field.sample(q).share, &mut on_nodes);
@@ -198,13 +198,13 @@ impl Field {
         if let Some(one) = plain_vector(q, joints).map(|q| q.read()).filter(JointVector::is_finite) {
             let out = Output::new(out, joints)?;
             let mut torque = self.field.sample(&one).torque;
-            self.bound(&one, &mut torque)?;
+            self.bound(0, &one, &mut torque)?;
             return Ok(out.write(q.py(), &torque));
         }
         let configurations = Configurations::new(q, joints)?;
-        let look_up = |q: &[f64], out: &mut [f64]| {
+        let look_up = |first: usize, q: &[f64], out: &mut [f64]| {
             self.field.torques(q, out, None).map_err(errors::rows)?;
-            self.bound(q, out)
+            self.bound(first, q, out)
         };
         Ok(configurations.fill(&[joints], out, look_up)?.into_any())
     }
@@ -268,7 +268,7 @@ impl Field {
     /// computed.
     fn status<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Array<'py, u8>> {
         let joints = self.field.joints();
-        Configurations::new(q, joints)?.fill(&[], None, |q, out: &mut [u8]| {
+        Configurations::new(q, joints)?.fill(&[], None, |_, q, out: &mut [u8]| {
             fill_rows(q, joints, out, |q, out| out[0] = self.field.sample(q).status() as u8).map_err(errors::rows)
         })
     }

@@ -1,6 +1,8 @@
-//! The threads that share work out. The engine takes rayon's, of which there are one set for a process; a process that
-//! was forked has none of them, but would wait for them for ever: there, a pool of its own takes their place.
+//! The threads that share work out. The engine takes rayon's, of which there are one set for a process. A process that
+//! was forked has none of them, but would wait for them for ever, and they are begun but once: where they are missing, a
+//! pool of its own takes their place.
 
+use haptize::{Error, threads};
 use pyo3::{exceptions::PyOSError, prelude::*, types::PyDict};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::{
@@ -11,7 +13,7 @@ use std::{
 /// Whether this process was forked from one that had loaded the package.
 static FORKED: AtomicBool = AtomicBool::new(false);
 
-/// The pool of a process that was forked, once it is needed; it lives as long as the process. No lock: one that another
+/// The pool of a process without these threads, once it is needed; it lives as long as the process. No lock: one that another
 /// thread held at the fork would never be released.
 static POOL: AtomicPtr<ThreadPool> = AtomicPtr::new(null_mut());
 
@@ -22,16 +24,21 @@ pub fn detach<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyRes
 
 /// Does `work`, sharing it out among threads of this process.
 pub fn run<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    if !FORKED.load(Ordering::Acquire) {
-        return Ok(work());
+    if FORKED.load(Ordering::Acquire) || threads::begin_shared().is_err() {
+        return Ok(pool()?.install(work));
     }
-    Ok(pool()?.install(work))
+    Ok(work())
+}
+
+/// The exception of threads that the system does not give.
+pub fn refused(why: Error) -> PyErr {
+    PyOSError::new_err(why.to_string())
 }
 
 fn pool() -> PyResult<&'static ThreadPool> {
     let mut there = POOL.load(Ordering::Acquire);
     if there.is_null() {
-        let made = ThreadPoolBuilder::new().build().map_err(|error| PyOSError::new_err(error.to_string()))?;
+        let made = ThreadPoolBuilder::new().build().map_err(|why| refused(threads::refused(why)))?;
         let made = Box::into_raw(Box::new(made));
         there = match POOL.compare_exchange(null_mut(), made, Ordering::AcqRel, Ordering::Acquire) {
             Ok(_) => made,

@@ -1,6 +1,10 @@
 """Look-ups, one or many, and what cannot be looked up."""
 
+import os
+import signal
+import sys
 import threading
+import time
 
 import haptize
 import numpy as np
@@ -31,6 +35,31 @@ def test_one_and_many_give_the_same(field):
     status = field.status(q)
     assert status.dtype == np.uint8 and set(np.unique(status)) <= {0, 1}
     assert field.energy(q).shape == field.gap(q).shape == status.shape == (10_000,)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="os.kill ends a process there")
+@pytest.mark.parametrize("look_up", ["torque", "gradient", "status"])
+def test_ctrl_c_ends_a_batch(field, look_up):
+    # What is started in the background of a script is made to ignore it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    # Seconds of work.
+    q = np.tile(PRESSED, (10_000_000, 1))
+    begun = time.monotonic()
+    threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        getattr(field, look_up)(q)
+    assert time.monotonic() - begun < 1.3
+
+
+def test_a_refused_configuration_is_counted_from_the_beginning(dataset):
+    bounded = haptize.Field(dataset, bounds_error=True)
+    q = np.tile(PRESSED, (100_000, 1))
+    q[98_765] = [9.0, 0.0]
+    with pytest.raises(ValueError, match="configuration 98765 is outside"):
+        bounded.torque(q)
+    q[98_766] = np.nan
+    with pytest.raises(ValueError, match="configuration 98766 is not a finite number"):
+        bounded.torque(q)
 
 
 def test_lists_integers_and_strided_arrays_are_taken(field):

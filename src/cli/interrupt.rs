@@ -7,7 +7,7 @@
 //! ignored.
 
 use super::{Failure, last_words};
-use crate::{dataset::discard_unfinished, device::serial};
+use crate::{dataset::discard_unfinished, device::serial, threads};
 use std::{
     sync::{
         Mutex, PoisonError,
@@ -64,12 +64,7 @@ pub fn listen(json: bool, resumes: bool) -> Result<(), Failure> {
             end(json, resumes);
         }
     })
-    .map_err(|error| {
-        format!(
-            "cannot listen for signals: {error}; close other programs, or raise the limits on processes and memory \
-             (ulimit -u, ulimit -v)"
-        )
-    })?;
+    .map_err(|why| threads::refused(why).within("cannot listen for signals"))?;
     ignore(&ignored);
     Ok(())
 }

@@ -16,6 +16,7 @@ pub struct Keyboard {
 #[cfg(unix)]
 mod unix {
     use super::{Failure, KeyInput, Keyboard};
+    use crate::threads::spawn;
     use rustix::{
         event::{PollFd, PollFlags, Timespec, poll},
         io::read,
@@ -27,7 +28,6 @@ mod unix {
             Arc,
             atomic::{AtomicBool, Ordering},
         },
-        thread,
     };
 
     /// How long the reader waits before it looks whether it is over.
@@ -51,7 +51,9 @@ mod unix {
             tcsetattr(stdin(), OptionalActions::Now, &raw)?;
             let over = Arc::new(AtomicBool::new(false));
             let ends = Arc::clone(&over);
-            let reader = thread::Builder::new().name("keyboard".into()).spawn(move || {
+            // Dropped, it gives the terminal back.
+            let mut keyboard = Self { before, over, reader: None };
+            keyboard.reader = Some(spawn("keyboard", move || {
                 let mut characters = [0; 64];
                 while !ends.load(Ordering::Relaxed) {
                     let input = stdin();
@@ -62,8 +64,8 @@ mod unix {
                         key.press();
                     }
                 }
-            })?;
-            Ok(Self { before, over, reader: Some(reader) })
+            })?);
+            Ok(keyboard)
         }
     }
 

@@ -69,6 +69,7 @@ use crate::{
     names,
     render::trace::Tick,
     sweep::{OTHER_ADAPTER, remedied},
+    threads,
 };
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::{
@@ -208,7 +209,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     // What refines a grid keeps nothing before its end.
     let refines = matches.subcommand().is_some_and(|(_, given)| given.try_contains_id("refine").unwrap_or(false));
     let resumes = has(&matches, "resume") && !refines;
-    let begun = interrupt::listen(line.json, resumes).and_then(|()| start_threads());
+    let begun = interrupt::listen(line.json, resumes).and_then(|()| Ok(threads::begin_shared()?));
     let report = begun.and_then(|()| line.command.as_ref().map_or_else(demo::run, Command::run));
     match report.and_then(|report| print(&report, line.json).map(|()| report.whole)) {
         Ok(true) => 0,
@@ -300,13 +301,6 @@ fn telling_faults(next: &mut dyn FnMut(&Tick)) -> impl FnMut(&Tick) {
 /// command a terminal.
 fn printable(text: &str) -> Cow<'_, str> {
     names::escaped_but(text, &['\n'])
-}
-
-/// Starts the threads that all work shares: where the system gives none, this is an error here and a panic later.
-fn start_threads() -> Result<(), Failure> {
-    let remedy = "close other programs, or raise the limits on processes and memory (ulimit -u, ulimit -v)";
-    let started = rayon::ThreadPoolBuilder::new().build_global();
-    started.map_err(|error| format!("no threads to work with: {error}; {remedy}").into())
 }
 
 /// Prints one half of `report`. A reader that has seen enough (`haptize info ... | head`) is no failure.

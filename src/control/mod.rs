@@ -12,10 +12,11 @@ pub use clock::{Clock, LONGEST_ARREARS, Paced, Patience, check_rate};
 use timing::Timing;
 
 use crate::{
-    JointVector,
+    Error, JointVector,
     device::{Applied, Device, Reading},
+    threads::spawn_scoped,
 };
-use std::{io, thread, time::Duration};
+use std::{thread, time::Duration};
 
 /// How often records are taken over from another thread.
 const TAKEN_EVERY: Duration = Duration::from_millis(5);
@@ -30,9 +31,9 @@ pub fn beside<T: Send, R: Send>(
     mut sent: rtrb::Consumer<T>,
     work: impl FnOnce() -> R + Send,
     take: &mut dyn FnMut(T),
-) -> io::Result<thread::Result<R>> {
+) -> Result<thread::Result<R>, Error> {
     thread::scope(|scope| {
-        let working = thread::Builder::new().name(name.into()).spawn_scoped(scope, work)?;
+        let working = spawn_scoped(scope, name, work)?;
         loop {
             let is_last = working.is_finished();
             while let Ok(record) = sent.pop() {

@@ -20,7 +20,7 @@ mod frame;
 pub use frame::{DeviceState, Frame};
 
 use super::{Command, Coordinates, Halt, Hardware, Limits, Measurement, Watchdog};
-use crate::JointVector;
+use crate::{JointVector, threads::spawn};
 use std::{
     fmt::Write as _,
     io::{self, ErrorKind, Read, Write},
@@ -127,8 +127,7 @@ impl Inverse3 {
         let (wanted, commands) = triple_buffer::triple_buffer(&Wanted { force: None, at: now });
         let over = Arc::new(AtomicBool::new(false));
         let link = Link { socket, id: id.clone(), seen: first, publish, commands, over: Arc::clone(&over) };
-        let thread = thread::Builder::new().name("inverse3".into()).spawn(move || link.run());
-        let thread = thread.map_err(|error| format!("no thread for the connection: {error}"))?;
+        let thread = spawn("inverse3", move || link.run()).map_err(|error| error.to_string())?;
         Ok(Self { id, seen, wanted, enabled: false, over, thread: Some(thread) })
     }
 }

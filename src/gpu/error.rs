@@ -36,6 +36,9 @@ pub enum GpuError {
     /// The device was lost: driver reset, removal, or a dispatch that ran too long.
     #[error("the GPU was lost: {0}. Use --backend cpu, or update the driver")]
     Lost(String),
+    /// The system gives no thread that drives the device.
+    #[error(transparent)]
+    NoThread(Error),
     /// Device memory is exhausted.
     #[error("the GPU is out of memory: {0}. Use a smaller object, close other programs, or use --backend cpu")]
     OutOfMemory(String),

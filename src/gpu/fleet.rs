@@ -7,6 +7,7 @@ use super::error::GpuError;
 use crate::{
     JointVector,
     contact::{CHUNKS_IN_FLIGHT, Equilibrium, Work},
+    threads::spawn_scoped,
 };
 use std::{
     collections::VecDeque,
@@ -112,14 +113,18 @@ pub(super) fn solve_together<D: Device>(
     let solved = std::thread::scope(|scope| {
         let (sender, reports) = mpsc::channel();
         for (number, device) in devices.iter_mut().enumerate() {
-            let (sender, queue, conclude) = (sender.clone(), &queue, &conclude);
-            scope.spawn(move || {
-                let _watched = Watched(&sender);
-                if let Err(error) = serve(device, queue, &sender, conclude) {
+            let (own, queue, conclude) = (sender.clone(), &queue, &conclude);
+            let begun = spawn_scoped(scope, "device", move || {
+                let _watched = Watched(&own);
+                if let Err(error) = serve(device, queue, &own, conclude) {
                     // Whoever listened has no more need of it.
-                    let _ = sender.send(Report::Failed(number, error));
+                    let _ = own.send(Report::Failed(number, error));
                 }
             });
+            if let Err(error) = begun {
+                // It is listened to below.
+                let _ = sender.send(Report::Failed(number, GpuError::NoThread(error)));
+            }
         }
         drop(sender);
         let mut chunks = VecDeque::<Chunk>::new();

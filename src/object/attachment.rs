@@ -1,10 +1,11 @@
 //! How the surface follows the nodes that K moves.
 //!
-//! A node of the surface stands for its own area: a third of each triangle around it. Its displacement is the mean of
-//! the solid's over that area, `u_i = sum_a N_ia u_a`, and a force on it is spread over the same area. Displacements
-//! and forces use the same N, so the compliance `C = N K^-1 N^T` is symmetric. Forces at points instead would make a
-//! node on a corner of the lattice four times as soft as its neighbours. On springs and skins the nodes of K are those
-//! of the surface, and N is the identity.
+//! A node of the surface stands for its own area: of each triangle around it what is nearer to it than to the other
+//! corners (Meyer et al., 2003). Where the corners of a flat face lie on a circle, it does not matter along which
+//! diagonals the face is cut. The node's displacement is the mean of the solid's over that area, `u_i = sum_a N_ia u_a`,
+//! and a force on it is spread over the same area. Displacements and forces use the same N, so the compliance
+//! `C = N K^-1 N^T` is symmetric. Forces at points instead would make a node on a corner of the lattice four times as soft
+//! as its neighbours. On springs and skins the nodes of K are those of the surface, and N is the identity.
 
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -116,8 +117,8 @@ pub(super) struct SurfacePoint {
     pub normal: DVec3,
 }
 
-/// Points spread over the surface, closer than `spacing` (m). Each corner's third of a triangle, between the middles of
-/// its edges and the triangle's, is two triangles; these are divided alike, with three points a part, exact for
+/// Points spread over the surface, closer than `spacing` (m). Each corner's own part of a triangle, between the middles
+/// of its edges and the circumcentre, is two triangles; these are divided alike, with three points a part, exact for
 /// quadratic functions.
 pub(super) fn surface_points(nodes: &[DVec3], triangles: &[[u32; 3]], spacing: f64) -> Vec<SurfacePoint> {
     let mut points = Vec::new();
@@ -125,14 +126,21 @@ pub(super) fn surface_points(nodes: &[DVec3], triangles: &[[u32; 3]], spacing: f
         let places = named.map(|node| nodes[node as usize]);
         let at = |weights: DVec3| (0..3).map(|k| weights[k] * places[k]).sum::<DVec3>();
         let double_area = (places[1] - places[0]).cross(places[2] - places[0]);
+        let centre = circumcentre(places);
         for (owner, side) in (0..3).flat_map(|owner| [(owner, 1), (owner, 2)]) {
             let unit = |k: usize| DVec3::from_array([0, 1, 2].map(|j| f64::from(u8::from(j == k % 3))));
-            let part = [unit(owner), unit(owner).midpoint(unit(owner + side)), DVec3::splat(1.0 / 3.0)];
+            let part = [unit(owner), unit(owner).midpoint(unit(owner + side)), centre];
+            if part[1] == part[2] {
+                // Beside an obtuse corner.
+                continue;
+            }
             let longest = (0..3).map(|k| at(part[k]).distance(at(part[(k + 1) % 3]))).fold(0.0, f64::max);
             let divisions = (longest / spacing).ceil().max(1.0);
             let [edge, other] = [1, 2].map(|k| (part[k] - part[0]) / divisions);
             let count = divisions as usize;
-            let area = double_area.length() / (36.0 * divisions * divisions);
+            // A third of a part, each of which is a half of the parallelogram of two of its sides.
+            let area = (at(part[1]) - places[owner]).cross(at(part[2]) - places[owner]).length()
+                / (6.0 * divisions * divisions);
             for (i, j) in (0..count).flat_map(|i| (0..count - i).map(move |j| (i, j))) {
                 let low = part[0] + i as f64 * edge + j as f64 * other;
                 let upward = [low, low + edge, low + other];
@@ -153,4 +161,16 @@ pub(super) fn surface_points(nodes: &[DVec3], triangles: &[[u32; 3]], spacing: f
         }
     }
     points
+}
+
+/// Barycentric coordinates of the circumcentre, or of the point of the triangle that is nearest to it: the middle of the
+/// longest side where the angle opposite is obtuse (Meyer et al., 2003).
+fn circumcentre(places: [DVec3; 3]) -> DVec3 {
+    let side = DVec3::from_array([0, 1, 2].map(|k| places[(k + 1) % 3].distance_squared(places[(k + 2) % 3])));
+    let cosine = DVec3::splat(side.element_sum()) - 2.0 * side;
+    let weights = side * cosine;
+    match (0..3).find(|k| cosine[*k] <= 0.0) {
+        Some(k) => DVec3::from_array([0, 1, 2].map(|j| if j == k { 0.0 } else { 0.5 })),
+        None => weights / weights.element_sum(),
+    }
 }

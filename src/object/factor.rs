@@ -16,6 +16,7 @@ use super::{
     outlook,
     substitution::{Partition, substitute},
     supernodes::Supernodes,
+    topology::point,
 };
 use crate::{Error, ErrorKind, error, memory};
 use faer::Side;
@@ -180,7 +181,7 @@ fn scatter(
 }
 
 /// The factor of K, or the reason why K is not positive definite to working precision.
-pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, Error> {
+pub(super) fn prove_positive_definite(stiffness: &Stiffness, nodes: &[DVec3]) -> Result<Factor, Error> {
     let mut diagonal = stiffness.diagonal();
     let largest = diagonal.iter().copied().fold(0.0, f64::max);
     // A node without any spring.
@@ -191,7 +192,7 @@ pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, E
         Ok(factor) => {
             let (smallest, softest) = softest_mode(&factor, &roots);
             if smallest < MIN_RECIPROCAL_CONDITION * norm {
-                return Err(mechanism(&softest, smallest / norm));
+                return Err(mechanism(nodes, &softest, smallest / norm));
             }
             Ok(factor)
         }
@@ -199,7 +200,7 @@ pub(super) fn prove_positive_definite(stiffness: &Stiffness) -> Result<Factor, E
             let shifts: Vec<f64> = diagonal.iter().map(|own| MECHANISM_SHIFT * own).collect();
             let shifted = Factor::of(stiffness, 1.0, &shifts)?;
             let (smallest, softest) = softest_mode(&shifted, &roots);
-            Err(mechanism(&softest, (smallest - MECHANISM_SHIFT).max(0.0) / norm))
+            Err(mechanism(nodes, &softest, (smallest - MECHANISM_SHIFT).max(0.0) / norm))
         }
         Err(error) => Err(error),
     }
@@ -238,14 +239,16 @@ fn norm(vectors: &[DVec3]) -> f64 {
 }
 
 /// The error that names the node which moves most in `mode`.
-fn mechanism(mode: &[DVec3], reciprocal_condition: f64) -> Error {
+fn mechanism(nodes: &[DVec3], mode: &[DVec3], reciprocal_condition: f64) -> Error {
     let largest = mode.iter().enumerate().max_by(|a, b| a.1.length_squared().total_cmp(&b.1.length_squared()));
     let (node, motion) = largest.map_or((0, DVec3::ZERO), |(node, motion)| (node, *motion));
+    let place = point(nodes[node]);
     let [x, y, z] = motion.normalize_or_zero().to_array();
     error!(
-        "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): node {node} can move \
-         along ({x:.2}, {y:.2}, {z:.2}) almost without force; axial springs leave such mechanisms, and a skin on sliver \
-         triangles comes near them: ground more nodes, stiffen the ground, use isotropic springs, or mesh evenly"
+        "the stiffness is not positive definite (reciprocal condition {reciprocal_condition:.0e}): what is at {place} can \
+         move along ({x:.2}, {y:.2}, {z:.2}) almost without force; so does a part of a solid that the ground does not \
+         reach, axial springs leave such mechanisms, and a skin on sliver triangles comes near them: ground more of the \
+         object, stiffen the ground, use isotropic springs, or mesh evenly"
     )
 }
 

@@ -42,6 +42,7 @@ pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, 
                 let last = nodes.len().saturating_sub(1);
                 *slot.ok_or_else(|| {
                     error!("ground names node {node}, but the object has nodes 0 to {last}: correct the list")
+                        .about("object.ground.nodes")
                 })? = true;
             }
             Ok(grounded)
@@ -52,7 +53,8 @@ pub(super) fn select(ground: &GroundSpec, nodes: &[DVec3]) -> Result<Vec<bool>, 
                 let lowest = nodes.iter().map(|n| n.z).fold(f64::INFINITY, f64::min);
                 return Err(error!(
                     "no node lies below z = {height} m, the lowest is at z = {lowest} m: raise the ground's height"
-                ));
+                )
+                .about("object.ground.below"));
             }
             Ok(grounded)
         }
@@ -133,7 +135,8 @@ pub(super) fn check_components(nodes: &[DVec3], components: &[Vec<u32>], grounde
                  its nodes, or give the skin a foundation",
                 counted(part.len(), ["node", "nodes"]),
                 at(nodes, part[0])
-            ));
+            )
+            .about("object.ground"));
         }
     }
     Ok(())

@@ -110,12 +110,13 @@ impl<'a> Materials<'a> {
     /// # Errors
     /// Names the first one.
     pub fn check(&self) -> Result<(), Error> {
-        let mut found = self.elastic.inclusions.iter().zip(&self.found[1..]);
-        match found.find(|(_, found)| !found.load(Ordering::Relaxed)) {
-            Some((inclusion, _)) => Err(error!(
+        let mut found = self.elastic.inclusions.iter().zip(&self.found[1..]).enumerate();
+        match found.find(|(_, (_, found))| !found.load(Ordering::Relaxed)) {
+            Some((number, (inclusion, _))) => Err(error!(
                 "no part of the solid is in the inclusion ({inclusion}), or a later one covers it: correct its place or the \
-                     order, or remove it"
-            )),
+                 order, or remove it"
+            )
+            .about(format!("object.elasticity.inclusion.{number}"))),
             None => Ok(()),
         }
     }

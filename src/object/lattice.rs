@@ -7,7 +7,9 @@
 //! halved until they are small beside it. A node on the face of a larger cube
 //! that is none of its nodes hangs on them, by their shape functions, so displacement is continuous.
 //!
-//! Walls thinner than half a cube have lines in them, but bend as polynomials of a whole cube do.
+//! Walls thinner than half a cube have lines in them, but bend as polynomials of a whole cube do. Where the surface only
+//! grazes a cube, no line has a stretch in it. Such a cube would be of the material outside alone; it is left out, and
+//! the surface follows the nearest one.
 
 use super::attachment::{SurfacePoint, surface_points};
 use super::element::{self, CUBE_NODES, GAUSS, Lame, Quadrature};
@@ -15,7 +17,7 @@ use super::inclusion::Materials;
 use super::level::{Filling, LINES, Level, across, line};
 use super::solid::Elements;
 use super::spacing::Spacing;
-use crate::Error;
+use crate::{Error, error};
 use glam::{DVec3, IVec3};
 use std::collections::BTreeMap;
 
@@ -33,7 +35,8 @@ const ABSENT: u32 = u32::MAX;
 pub(super) struct Lattice {
     /// Finest first, each of cubes twice as large as those before.
     levels: Vec<Level>,
-    /// Number in `cubes` of that which covers each of the smallest, or [`ABSENT`].
+    /// Number in `cubes` of that which covers each of the smallest, or which is nearest to the surface in it; else
+    /// [`ABSENT`].
     numbers: Vec<u32>,
     cubes: Vec<Cube>,
     nodes: Vec<DVec3>,
@@ -54,7 +57,7 @@ impl Lattice {
     /// `materials` cuts them. Returns points on all of the surface, too, each of which has a cube.
     ///
     /// # Errors
-    /// When there are too many cubes.
+    /// When there are too many cubes, or none holds a part of the body.
     pub fn fill(
         size: f64,
         (nodes, triangles): (&[DVec3], &[[u32; 3]]),
@@ -77,7 +80,7 @@ impl Lattice {
             for point in &points {
                 let cube = level.number(finest.place(point) >> number as u32);
                 facing[cube] += point.area * point.normal.abs();
-                is_fine[cube] |= spacing.level(point.owner) + halvings < number;
+                is_fine[cube] |= spacing.level(triangles[point.triangle], point.weights) + halvings < number;
             }
             let filled = level.fill(nodes, triangles, &facing);
             for (cube, filling) in filled.into_iter().enumerate() {
@@ -95,6 +98,12 @@ impl Lattice {
             }
         }
         lattice.number_nodes();
+        for point in &points {
+            let place = finest.number(finest.place(point));
+            if lattice.numbers[place] == ABSENT {
+                lattice.numbers[place] = lattice.nearest(point.place)?;
+            }
+        }
         Ok((lattice, points))
     }
 
@@ -151,6 +160,26 @@ impl Lattice {
                     .for_each(|(a, value)| self.carry(cube.node(a), weight * value, carriers));
             }
         }
+    }
+
+    /// Number of the cube that is nearest to `place`.
+    ///
+    /// # Errors
+    /// When there is none.
+    fn nearest(&self, place: DVec3) -> Result<u32, Error> {
+        let distance = |cube: &Cube| {
+            let [low, high] = self.level(cube).corners(cube.at);
+            place.distance_squared(place.clamp(low, high))
+        };
+        let distances = self.cubes.iter().map(distance).zip(0..);
+        let nearest = distances.min_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, cube)| cube);
+        nearest.ok_or_else(|| {
+            error!(
+                "the object is too thin for cubes of {} m: make object.elasticity.cell smaller, or refine the surface",
+                self.levels[0].size
+            )
+            .about("object.elasticity.cell")
+        })
     }
 
     fn level(&self, cube: &Cube) -> &Level {
@@ -290,5 +319,33 @@ impl Elements for Lattice {
         let cube = &self.cubes[element];
         let inner = (point.place - self.low(cube)) / self.level(cube).size;
         (element, cube.carried(&element::cube(inner.clamp(DVec3::ZERO, DVec3::ONE)).0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::icosphere;
+    use crate::scene::ElasticSpec;
+
+    /// The material of a cube does not depend on where points are laid on the surface in it.
+    #[test]
+    fn every_cube_holds_material_and_a_grazed_one_leaves_its_surface_to_the_nearest() {
+        let (nodes, triangles) = icosphere(DVec3::ZERO, 0.05, 10).unwrap();
+        let elastic = ElasticSpec { young: 1e4, poisson: 0.45, cell: None, inclusions: Vec::new() };
+        let materials = Materials::new(&elastic, &nodes);
+        let mut grazing = 0;
+        for size in [0.0053, 0.0081, 0.0123] {
+            let (lattice, points) = Lattice::fill(size, (&nodes, &triangles), &materials).unwrap();
+            assert!(lattice.cubes.iter().all(|cube| cube.filling.stretches().count() > 0), "cubes of {size} m");
+            for point in &points {
+                let cube = &lattice.cubes[lattice.locate(point).0];
+                let [low, high] = lattice.level(cube).corners(cube.at);
+                let distance = point.place.distance(point.place.clamp(low, high));
+                assert!(distance < size / LINES as f64, "{distance} m from a cube of {size} m");
+                grazing += usize::from(distance > 1e-6 * size);
+            }
+        }
+        assert!(grazing > 0, "no cube is grazed");
     }
 }

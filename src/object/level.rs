@@ -63,7 +63,8 @@ impl Level {
             return Err(error!(
                 "cells of {size} m make {cubes:.0} cubes of an object that is {length:.3} m long, more than {MAX_CUBES:.0}: \
                  make object.elasticity.cell larger, or scale a mesh that was drawn in millimetres"
-            ));
+            )
+            .about("object.elasticity.cell"));
         }
         // In the middle, so that a box of a whole number of cubes is met exactly.
         let origin = low.midpoint(high) - 0.5 * size * counts;
@@ -107,7 +108,7 @@ impl Level {
         (at - FACE * point.normal).floor().as_ivec3().clamp(IVec3::ZERO, self.counts - 1)
     }
 
-    /// What each cube holds of the closed surface, if anything. `facing`: the areas of the surface in it across each
+    /// What each cube holds of the inside of the closed surface, if anything. `facing`: the areas of the surface in it across each
     /// axis.
     pub fn fill(&self, nodes: &[DVec3], triangles: &[[u32; 3]], facing: &[DVec3]) -> Vec<Option<Filling>> {
         // Where no surface is, along z.
@@ -118,11 +119,10 @@ impl Level {
         let whole = |stretches: &[Stretch]| {
             stretches.len() == LINES * LINES && stretches.iter().all(|(_, ends)| *ends == [0.0, 1.0])
         };
-        let filling = |((stretches, facing), axis): ((Vec<Stretch>, &DVec3), usize)| {
-            let is_held = !stretches.is_empty() || *facing != DVec3::ZERO;
-            is_held.then(|| Filling { axis, inside: (!whole(&stretches)).then_some(stretches) })
+        let filling = |(stretches, axis): (Vec<Stretch>, usize)| {
+            (!stretches.is_empty()).then(|| Filling { axis, inside: (!whole(&stretches)).then_some(stretches) })
         };
-        inside.into_iter().zip(facing).zip(axes).map(filling).collect()
+        inside.into_iter().zip(axes).map(filling).collect()
     }
 
     /// Adds to `inside` what lies inside the surface, of those cubes whose lines run along `axis`.

@@ -71,7 +71,7 @@ impl Mechanics {
         let (moved, attachment) = match elements {
             Some(elements) => {
                 let moved = elements.positions().to_vec();
-                check_count(moved.len())?;
+                check_count(moved.len()).map_err(|error| error.about("object.elasticity.cell"))?;
                 let rows = [object.surface_nodes, nodes - object.surface_nodes, moved.len()];
                 let attachment = Attachment::averaged(&points, rows, |point| {
                     let (element, values) = elements.locate(point);
@@ -111,7 +111,7 @@ impl Mechanics {
             held.add(ground, grounded, &mut stiffness);
         }
         laplacian.iter().for_each(|(skin, laplacian)| laplacian.add(*skin, &attachment, &mut stiffness));
-        let factor = prove_positive_definite(&stiffness)?;
+        let factor = prove_positive_definite(&stiffness, &moved)?;
         Ok(Self {
             mass: share.iter().map(|share| spec.node_mass * nodes as f64 * share).collect(),
             damping: share.iter().map(|share| spec.node_damping * nodes as f64 * share).collect(),

@@ -114,7 +114,13 @@ impl Object {
     /// does not hold the object.
     pub fn build(spec: &ObjectSpec) -> Result<Self, Error> {
         let mut warnings = Vec::new();
-        let body = match &spec.shape {
+        let body = Self::shape(spec, &mut warnings).map_err(|error| error.about(spec.shape.key()))?;
+        Self::assemble(spec, body, warnings, cell::limit())
+    }
+
+    /// Generates or reads the geometry.
+    fn shape(spec: &ObjectSpec, warnings: &mut Vec<String>) -> Result<Body, Error> {
+        Ok(match &spec.shape {
             Shape::Sphere { centre, radius, rings, segments } => {
                 check_count(rings.saturating_mul(*segments).saturating_add(2))?;
                 Body::shell(sphere::generate(*centre, *radius, *rings, *segments)?)
@@ -124,10 +130,10 @@ impl Object {
                 Body::shell(icosphere::generate(*centre, *radius, *divisions)?)
             }
             Shape::Mesh { file, placement, refine } => {
-                let mut shell = import::read(file, placement, &mut warnings)?;
+                let mut shell = import::read(file, placement, warnings)?;
                 if let Some(edge) = refine {
                     let refuse = |defect: String| refused(spec, &defect);
-                    shell = refine::refine(shell, *edge, &mut warnings, refuse)?;
+                    shell = refine::refine(shell, *edge, warnings, refuse)?;
                 }
                 Body::shell(shell)
             }
@@ -141,10 +147,9 @@ impl Object {
                     InclusionPlace::Sphere { .. } => None,
                 };
                 let wanted: Vec<u32> = inclusions.iter().filter_map(region).collect();
-                import::read_tetrahedra(file, placement, &wanted, &mut warnings)?
+                import::read_tetrahedra(file, placement, &wanted, warnings)?
             }
-        };
-        Self::assemble(spec, body, warnings, cell::limit())
+        })
     }
 
     /// Builds the object of `spec` on another surface; no file is read.
@@ -174,7 +179,7 @@ impl Object {
     /// `limit`: most memory that a lattice may take whose cubes have no size given (B).
     fn assemble(spec: &ObjectSpec, mut body: Body, mut warnings: Vec<String>, limit: f64) -> Result<Self, Error> {
         check_parameters(spec)?;
-        check_count(body.nodes.len())?;
+        check_count(body.nodes.len()).map_err(|error| error.about(spec.shape.key()))?;
         let surface = topology::close(&body.nodes[..body.surface_nodes], &mut body.triangles)
             .map_err(|defect| refused(spec, &defect))?;
         warnings.extend(surface.warnings);
@@ -329,10 +334,11 @@ fn check_parameters(spec: &ObjectSpec) -> Result<(), Error> {
 
 /// The error of a surface on which contact cannot be computed, because of `defect`.
 fn refused(spec: &ObjectSpec, defect: &str) -> Error {
-    match &spec.shape {
+    let error = match &spec.shape {
         Shape::Sphere { .. } | Shape::Icosphere { .. } => error!("sphere: {defect}"),
         Shape::Mesh { file, .. } | Shape::Tetrahedra { file, .. } => Error::at(file, defect),
-    }
+    };
+    error.about(spec.shape.key())
 }
 
 /// The error of the number `name` that is `value`, and must be in `range`.

@@ -34,7 +34,8 @@ pub(super) fn refine(
         }
         // Each step makes about four times as many: too many in the end are too many now.
         let steps = (mean_edge / edge).log2().ceil();
-        check_count((nodes.len() as f64 * 4.0f64.powf(steps)) as usize)?;
+        let count = (nodes.len() as f64 * 4.0f64.powf(steps)) as usize;
+        check_count(count).map_err(|error| error.about("object.mesh.refine"))?;
         (nodes, triangles) = divide(&nodes, &triangles, &surface.topology);
     }
 }

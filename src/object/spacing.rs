@@ -53,8 +53,9 @@ impl Spacing {
         EDGES_PER_CUBE * self.finest
     }
 
-    /// How often cubes that suit the finest part may be doubled at `node`.
-    pub fn level(&self, node: u32) -> usize {
-        (2.0 / DOUBLED_FROM * self.edges[node as usize] / self.finest).log2() as usize
+    /// How often cubes that suit the finest part may be doubled at the point of `weights` in `triangle`.
+    pub fn level(&self, triangle: [u32; 3], weights: DVec3) -> usize {
+        let edge: f64 = (0..3).map(|k| weights[k] * self.edges[triangle[k] as usize]).sum();
+        (2.0 / DOUBLED_FROM * edge / self.finest).log2() as usize
     }
 }

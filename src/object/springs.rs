@@ -18,7 +18,8 @@ use glam::{DMat3, DVec3};
 /// When the tetrahedra have nodes in the middles of their edges.
 pub(super) fn edges(object: &Object) -> Result<Vec<[u32; 2]>, Error> {
     if !object.mid_nodes.is_empty() {
-        return Err("springs run along tetrahedra of four nodes: save the mesh in first order (gmsh -order 1)".into());
+        let message = "springs run along tetrahedra of four nodes: save the mesh in first order (gmsh -order 1)";
+        return Err(Error::from(message).about("object.springs"));
     }
     let ends = |corners: &[u32; 4]| {
         let corners = *corners;

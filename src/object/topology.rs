@@ -115,7 +115,7 @@ fn between(nodes: &[DVec3], ends: [u32; 2]) -> String {
 }
 
 /// A point as a message gives it.
-fn point(place: DVec3) -> String {
+pub(super) fn point(place: DVec3) -> String {
     format!("{} m", coordinates(place))
 }
 

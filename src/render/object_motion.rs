@@ -21,6 +21,7 @@ use crate::{
     Error, error,
     object::{Factor, Mechanics, Object, Stiffening, settled},
     scene::GraphicsEffects,
+    threads::refused,
 };
 use glam::DVec3;
 use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
@@ -86,8 +87,7 @@ impl<'object> ObjectMotion<'object> {
         let factor = dynamics.as_ref().map_or(&mechanics.factor, |dynamics| &dynamics.factor);
         let threads =
             factor.is_shared().then(|| ThreadPoolBuilder::new().thread_name(|k| format!("frame {k}")).build());
-        let threads =
-            threads.transpose().map_err(|error| error!("no threads can be had for the object's frames: {error}"))?;
+        let threads = threads.transpose().map_err(refused)?;
         Ok(Self { object, mechanics, period, dynamics, stiffening, weight, displacement, right: zero, threads })
     }
 

@@ -16,6 +16,7 @@ use crate::{
     control::{Clock, Paced, Patience, beside, real_time},
     device::{Device, Halt},
     error,
+    threads::spawn_scoped,
 };
 use std::{
     sync::atomic::{AtomicBool, Ordering},
@@ -113,9 +114,7 @@ pub fn run(
         let drawing = graphics.map(|graphics| {
             let frames = Frames::new(graphics, plan);
             let over = &over;
-            thread::Builder::new()
-                .name("graphics".into())
-                .spawn_scoped(scope, move || draw(frames, latest, frame_cost, over))
+            spawn_scoped(scope, "graphics", move || draw(frames, latest, frame_cost, over))
         });
         let drawing = drawing.transpose().map_err(cannot_start)?;
         let work = || {

@@ -183,8 +183,7 @@ impl Session<'_> {
             let send = |scan: &mut ScanController<'_>, row: Option<ScanRow>, _| {
                 row.is_none_or(|row| rows.push(row).is_ok()) && !scan.is_over()
             };
-            stopped = beside("device", measured, || driver.run(clock, send).refused, &mut take)
-                .map_err(|why| error!("a scan needs a thread for its device: {why}; close other programs"))?
+            stopped = beside("device", measured, || driver.run(clock, send).refused, &mut take)?
                 .map_err(|_| rig_failed("the thread that drives the device ended unexpectedly"))?;
         } else {
             driver.run(clock, |scan, row, _| {

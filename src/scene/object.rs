@@ -79,6 +79,15 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// The key of a scene that names it.
+    pub(crate) fn key(&self) -> &'static str {
+        match self {
+            Self::Sphere { .. } | Self::Icosphere { .. } => "object.sphere",
+            Self::Mesh { .. } => "object.mesh.file",
+            Self::Tetrahedra { .. } => "object.tetrahedra.file",
+        }
+    }
+
     /// The point that is moved to move the object: the centre of a sphere, the origin of a file's coordinates (m).
     #[must_use]
     pub fn centre(&self) -> DVec3 {

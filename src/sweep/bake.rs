@@ -2,12 +2,12 @@
 
 use super::{BackendChoice, ChosenBackend, Progress, Run, Shard, Sweep, SweepReport, model_within};
 use crate::{
-    Error, ErrorKind,
+    Error,
     contact::{MeshRipple, Model},
     dataset::Dataset,
     object::{Compliance, LatticeError, Object},
     proxy::Chain,
-    scene::Scene,
+    scene::{Checker, Scene},
 };
 use std::{
     path::{Path, PathBuf},
@@ -17,7 +17,7 @@ use std::{
 /// Builds the object of `scene`, where there is memory to solve contact with it.
 ///
 /// # Errors
-/// Where it is refused, with its line in the scene.
+/// Where it is refused, with its place in the scene.
 pub fn build_object(scene: &Scene) -> Result<Object, Error> {
     let object = Object::build(&scene.object).and_then(|object| {
         // Of a larger surface only a part of the compliance is formed, and its size is checked when it is known.
@@ -26,9 +26,9 @@ pub fn build_object(scene: &Scene) -> Result<Object, Error> {
         }
         Ok(object)
     });
-    object.map_err(|source| {
-        let line = scene.text.lines().position(|line| line.trim_start_matches([' ', '[']).starts_with("object"));
-        Error::on_line(&scene.path, line.map_or(1, |line| line + 1) as u64, source).of(ErrorKind::Scene)
+    object.map_err(|error| {
+        let checker = Checker { path: &scene.path, text: &scene.text };
+        checker.at(error.key().unwrap_or("object"), &error)
     })
 }
 

@@ -15,6 +15,7 @@ use crate::{
     contact::{Equilibrium, SHARE, Work},
     dataset::Provenance,
     error,
+    threads::spawn_scoped,
 };
 use std::{
     collections::VecDeque,
@@ -141,13 +142,7 @@ impl Sweep<'_> {
             store.keep(entry).map(|room| room.into_iter().for_each(|room| drop(back.send(room))))
         };
         thread::scope(|scope| {
-            let keeper = thread::Builder::new().name("keeper".into());
-            let keeper = keeper.spawn_scoped(scope, move || to_keep.into_iter().try_for_each(keep)).map_err(|why| {
-                error!(
-                    "no thread can be had that keeps the results: {why}; close other programs, or raise the limits on \
-                     processes and memory (ulimit -u, ulimit -v)"
-                )
-            })?;
+            let keeper = spawn_scoped(scope, "keeper", move || to_keep.into_iter().try_for_each(keep))?;
             let solved = self.solve_chunks(backend, run, (tally, provenance), part, (entries, room));
             // What a store says comes first: a sweep whose store has failed only knows that nobody takes its results.
             keeper.join().unwrap_or_else(|panic| resume_unwind(panic))?;

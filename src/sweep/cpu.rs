@@ -5,8 +5,8 @@ use crate::{
     Error, JointVector,
     contact::{Equilibrium, Model, SHARE, Solvers, Work},
     dataset::Provenance,
-    error,
     scene::Scene,
+    threads,
 };
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 use std::{
@@ -37,9 +37,7 @@ impl<'a> CpuBackend<'a> {
     /// When the system gives no threads.
     pub fn new(model: &'a Model<'a>, threads: usize) -> Result<Self, Error> {
         let pool = ThreadPoolBuilder::new().num_threads(threads).thread_name(|k| format!("contact {k}")).build();
-        let pool = pool.map_err(|why| {
-            error!("no threads to solve on: {why}; close other programs or raise the limit on processes (ulimit -u)")
-        })?;
+        let pool = pool.map_err(threads::refused)?;
         let solvers = Solvers::new(model, pool.current_num_threads());
         Ok(Self { pool, solvers })
     }

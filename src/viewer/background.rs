@@ -1,8 +1,9 @@
 //! Work in threads of their own, so that the window never waits for it.
 
+use crate::threads;
 use std::{
     sync::mpsc::{self, TryRecvError},
-    thread::{Builder, JoinHandle},
+    thread::JoinHandle,
 };
 
 /// Something that is being made, and is taken once it is there. Whoever drops it before lets it come to nothing.
@@ -118,8 +119,7 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
 /// # Errors
 /// In words, when the system gives none.
 pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, String> {
-    let spawned = Builder::new().name(name.into()).spawn(work);
-    spawned.map_err(|error| format!("the system gives no thread: {error}; close other programs"))
+    threads::spawn(name, work).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

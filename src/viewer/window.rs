@@ -1,7 +1,11 @@
 //! The viewer in a window of the desktop.
 
 use super::{DeviceChoice, Start, TickSource, ViewError, Viewer, dress, theme};
-use crate::gpu::{AdapterChoice, Context, GpuError};
+use crate::{
+    Error,
+    gpu::{AdapterChoice, Context, GpuError},
+    threads::spawn,
+};
 use eframe::{
     egui::{self, ViewportBuilder},
     egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting},
@@ -14,7 +18,6 @@ use std::{
         atomic::{AtomicBool, Ordering},
         mpsc::{self, RecvTimeoutError},
     },
-    thread,
     time::{Duration, Instant},
 };
 
@@ -85,9 +88,9 @@ pub fn open(start: Start, device: Option<DeviceChoice>) -> Result<(), ViewError>
 }
 
 /// Closes the window of `egui` when `stop` is raised, until what is returned is dropped.
-fn close_by(stop: &'static AtomicBool, egui: egui::Context) -> std::io::Result<mpsc::Sender<()>> {
+fn close_by(stop: &'static AtomicBool, egui: egui::Context) -> Result<mpsc::Sender<()>, Error> {
     let (open, closed) = mpsc::channel();
-    thread::Builder::new().name("closer".into()).spawn(move || {
+    spawn("closer", move || {
         while closed.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
             if stop.load(Ordering::Relaxed) {
                 egui.send_viewport_cmd(egui::ViewportCommand::Close);

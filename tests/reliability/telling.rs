@@ -1,9 +1,9 @@
 //! What is said: nothing that a file holds commands a terminal, files that contradict themselves are not called sound,
 //! and every message names the file and a remedy that helps.
 
-use super::objects::{OBJECTS, write_scene};
+use super::objects::{OBJECTS, scene, write_scene};
 use crate::common::program::{command, message, succeed};
-use haptize::dataset::Dataset;
+use haptize::{dataset::Dataset, scene::Scene, sweep::build_object};
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::Path,
@@ -158,8 +158,8 @@ fn messages_name_the_file_and_what_helps() {
             "x.haptize: cannot be read: it is no text",
             "UTF-8",
         ),
-        (&["bake", "ground.toml"], "ground.toml:2: no node lies below", "--resume"),
-        (&["inspect", "ground.toml", "--q", "0,0"], "ground.toml:2: no node lies below", "--resume"),
+        (&["bake", "ground.toml"], "ground.toml:3:38: no node lies below", "--resume"),
+        (&["inspect", "ground.toml", "--q", "0,0"], "ground.toml:3:38: no node lies below", "--resume"),
         (&["bake", "huge.toml"], "huge.toml:", "0000000000"),
         (&["inspect", "broken.haptize", "--q", "0,0"], "the scene in the dataset", "broken.haptize:1:"),
         (&["gridize", "bytes.csv", "--step", "1"], "bytes.csv: not a scan log", "room"),
@@ -176,6 +176,31 @@ fn messages_name_the_file_and_what_helps() {
     };
     let said = message(&blind(&["view", "x.haptize", "--screenshot", "x.png"]));
     assert!(said.contains("mesa-vulkan-drivers") && !said.contains("--backend"), "{said}");
+}
+
+/// What can be refused of an object only when it is built.
+#[test]
+fn what_is_refused_of_an_object_is_shown_at_its_key() {
+    let home = tempfile::tempdir().unwrap();
+    let [springs, .., lattice] = OBJECTS.map(|(_, object)| object);
+    write_scene(home.path(), springs, 3);
+    std::fs::write(home.path().join("open.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let path = home.path().join("scene.toml");
+    let inclusion = "cell = 0.03, inclusion = [{ sphere = { centre = [0.0, 0.0, 1.0], radius = 0.01 }, young = 1e5 }]";
+    for (object, old, new, place) in [
+        (springs, "stiffness = 50.0", "stiffness = 50.0, below = -9.0", "-9.0"),
+        (springs, "stiffness = 50.0", "stiffness = 50.0, nodes = [0, 700]", "[0, 700]"),
+        (springs, "cube.obj\"", "open.obj\"", "\"open.obj\""),
+        (springs, "scale = 0.04", "scale = 0.04, refine = 1e-6", "1e-6"),
+        (lattice, "cell = 0.03", "cell = 1e-5", "1e-5"),
+        (lattice, "cell = 0.03", inclusion, "{ sphere"),
+        (springs, "stiffness = 50.0", "stiffness = 1e-12", "[object]"),
+    ] {
+        let text = scene(object, 3).replacen(old, new, 1);
+        let expected = text.lines().enumerate().find_map(|(line, text)| Some((line + 1, text.find(place)? + 1)));
+        let error = build_object(&Scene::parse(&text, &path).unwrap()).unwrap_err();
+        assert_eq!(error.location().unwrap().line, expected, "{new}: {error}");
+    }
 }
 
 /// Options that `said` names and that the command has not of which it is said: that of the last `haptize COMMAND` in

@@ -84,25 +84,28 @@ fn the_surface_follows_the_mean_over_its_own_area() {
     let ball = Object::build(&spec(ball, elastic(0.3, None), bed(1e6))).unwrap();
     let areas = own_areas(&ball);
     let displacement: Vec<DVec3> = ball.mechanics().unwrap().moved.iter().map(|x| strained(*x)).collect();
-    let mut means = vec![DVec3::ZERO; ball.surface_nodes];
+    let (mut means, mut whole) = (vec![DVec3::ZERO; ball.surface_nodes], vec![0.0; ball.surface_nodes]);
     for triangle in &ball.triangles {
-        let places = triangle.map(|node| ball.rest[node as usize]);
-        let area = 0.5 * (places[1] - places[0]).cross(places[2] - places[0]).length();
+        let [a, b, c] = triangle.map(|node| ball.rest[node as usize]);
+        let (to_b, to_c) = (b - a, c - a);
+        let normal = to_b.cross(to_c);
+        let centre = a
+            + (to_c.length_squared() * normal.cross(to_b) + to_b.length_squared() * to_c.cross(normal))
+                / (2.0 * normal.length_squared());
         for k in 0..3 {
-            // The middle of a corner's third of a triangle.
-            let third = (22.0 * places[k] + 7.0 * (places[(k + 1) % 3] + places[(k + 2) % 3])) / 36.0;
-            means[triangle[k] as usize] += area / 3.0 * third;
+            // What is nearer to a corner than to the others: two triangles, since none is obtuse.
+            let [own, next, last] = [0, 1, 2].map(|j| [a, b, c][(k + j) % 3]);
+            for middle in [own.midpoint(next), own.midpoint(last)] {
+                let area = 0.5 * (middle - own).cross(centre - own).length();
+                means[triangle[k] as usize] += area / 3.0 * (own + middle + centre);
+                whole[triangle[k] as usize] += area;
+            }
         }
     }
-    let whole = |node: usize| -> f64 {
-        let around = ball.topology.triangles_around(node).iter().map(|&t| ball.triangles[t as usize]);
-        let area = |[a, b, c]: [DVec3; 3]| 0.5 * (b - a).cross(c - a).length();
-        around.map(|triangle| area(triangle.map(|node| ball.rest[node as usize])) / 3.0).sum()
-    };
     for node in 0..ball.surface_nodes {
         let sum: f64 = ball.mechanics().unwrap().attachment.row(node).iter().map(|(_, weight)| weight).sum();
         assert!((sum - 1.0).abs() < 1e-12, "a shift moves every node alike: {sum}");
-        let expected = strained(means[node] / whole(node));
+        let expected = strained(means[node] / whole[node]);
         assert!(
             (ball.mechanics().unwrap().attachment.follow(node, &displacement) - expected).length() < 1e-15,
             "node {node}"
