@@ -73,7 +73,7 @@ fn main() {
         setups.iter().zip(&datasets).map(|(setup, dataset)| setup.graphics(dataset).unwrap()).collect();
     let frames = in_turns(ROUNDS, count, |k| {
         let Some(graphics) = &mut drawn[k] else { return Vec::new() };
-        places.iter().map(|(q, share)| timed(|| graphics.frame(&latest(q, *share))).0).collect()
+        places.iter().map(|(q, share)| timed(|| graphics.frame(&latest(q, *share), true)).0).collect()
     });
     let bytes: Vec<f64> = datasets.iter().map(|dataset| dataset.summary().bytes as f64).collect();
     println!("plain: {:.2} s a bake, {:.0} bytes", bakes[PLAIN], bytes[PLAIN]);

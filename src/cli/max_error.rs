@@ -10,7 +10,7 @@ use super::{
 use crate::{
     Error,
     scene::Scene,
-    sweep::{Aim, BackendChoice, Bake, Choice, Pilot},
+    sweep::{Aim, BackendChoice, Bake, Choice, Direct, Pilot},
 };
 use serde::Serialize;
 use std::path::Path;
@@ -61,7 +61,8 @@ pub fn run(
 ) -> Result<Report, Failure> {
     let (pilot, choice, sweep) = watch::watched(scene, backend, |bake| {
         tell(format_args!("haptize: pilot: coarse grids against random configurations ..."));
-        let pilot = Pilot::run(scene, goal.aim, bake.backend, bake.stop)?;
+        let direct = Direct::at_rest(scene)?;
+        let pilot = Pilot::run(scene, direct.model(), goal.aim, bake.backend, bake.stop)?;
         let choice = pilot.choose(scene, goal.points)?;
         state(&pilot, &choice);
         let aim = Some(pilot.relative);

@@ -7,9 +7,9 @@ use super::{
 };
 use crate::{
     object::{Draft, LengthUnit},
-    scene::{Scene, SceneText},
+    scene::{GraphicsEffects, GraphicsSpec, Scene, SceneText},
     sweep::Placing,
-    toml_text::{list, number, vector},
+    toml_text::{entry, list, number, vector},
 };
 use glam::DVec3;
 use serde::Serialize;
@@ -84,6 +84,16 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         changed.push(format!("{}, whose unit is {unit} mm, {} kPa", mesh.display(), 1e-3 * arguments.young));
         let mut text = SceneText::new(&scene.text, &scene.path)?;
         text.replace(&draft.tables)?;
+        if let Some(GraphicsSpec { rate, effects }) = scene.graphics
+            && effects == GraphicsEffects::default()
+        {
+            let mut graphics = "[graphics]\n".to_owned();
+            entry(&mut graphics, "rate", &format!("{rate:?}"), "Hz").map_err(|error| error.to_string())?;
+            let meaning = "without dynamics: a solid is drawn much sooner";
+            entry(&mut graphics, "quasi_static", "true", meaning).map_err(|error| error.to_string())?;
+            text.replace(&graphics)?;
+            changed.push("drawn in equilibrium, without dynamics: [graphics] quasi_static".into());
+        }
         scene = Scene::parse(&text.to_string(), &scene.path)?;
     }
     let mut text = SceneText::new(&scene.text, &scene.path)?;

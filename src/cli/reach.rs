@@ -8,7 +8,7 @@ use super::{
 use crate::{
     names::duration,
     scene::{Scene, SceneText},
-    sweep::{Aim, BackendChoice, Cost, JointReach, Pilot, Reach},
+    sweep::{Aim, BackendChoice, Cost, Direct, JointReach, Pilot, Reach},
 };
 use serde::Serialize;
 use std::{
@@ -114,13 +114,14 @@ pub fn complete(scene: Scene, backend: BackendChoice, chosen: bool) -> Result<Sc
     tell(format_args!("haptize: the scene leaves the grid out: looking for contact within the joint limits ..."));
     let stop = interrupt::stop_flag();
     let found = || -> Result<Scene, Failure> {
-        let reach = Reach::new(&scene, None, stop)?;
+        let direct = Direct::at_rest(&scene)?;
+        let reach = Reach::new(&scene, direct.model(), None, stop)?;
         let based = reach.scene(&scene)?;
         if chosen {
             return Ok(based);
         }
         let aim: Aim = ERROR.parse()?;
-        let pilot = Pilot::run(&based, aim, backend, stop)?;
+        let pilot = Pilot::run(&based, direct.model(), aim, backend, stop)?;
         let grid = grid(&reach, &pilot, &based, POINTS)?;
         grid.lines().for_each(|line| tell(format_args!("haptize: {line}")));
         Ok(Scene::parse(&format!("{}\n\n{grid}", scene.text.trim_end()), &scene.path)?)
@@ -142,14 +143,15 @@ struct Found {
 }
 
 fn find(scene: &Scene, arguments: &Arguments, stop: &AtomicBool) -> Result<Found, Failure> {
-    let reach = Reach::new(scene, arguments.depth, stop)?;
+    let direct = Direct::at_rest(scene)?;
+    let reach = Reach::new(scene, direct.model(), arguments.depth, stop)?;
     // What is known stands on the terminal, however the rest ends.
     for JointReach { name, unit, range: [low, high], .. } in &reach.joints {
         tell(format_args!("haptize: contact along {name}: {low:.4} to {high:.4} {unit}"));
     }
     let based = reach.scene(scene)?;
     tell(format_args!("haptize: coarse grids over these ranges against random configurations ..."));
-    let pilot = match Pilot::run(&based, arguments.max_error, arguments.backend, stop) {
+    let pilot = match Pilot::run(&based, direct.model(), arguments.max_error, arguments.backend, stop) {
         Err(_) if stop.load(Ordering::Relaxed) => {
             let grid = Err("stopped before its grids were tried: the ranges hold, a grid was not chosen".to_owned());
             return Ok(Found { reach, pilot: None, costs: Vec::new(), grid });

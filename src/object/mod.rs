@@ -113,6 +113,17 @@ impl Object {
     /// When the file cannot be read, the surface is not closed and orientable, a number is out of range, or the ground
     /// does not hold the object.
     pub fn build(spec: &ObjectSpec) -> Result<Self, Error> {
+        let object = Self::unproven(spec)?;
+        object.prove()?;
+        Ok(object)
+    }
+
+    /// The same for who asks for its surface alone: whether the ground holds it is seen in [`Object::prove`], or when it
+    /// is first asked for what it resists by.
+    ///
+    /// # Errors
+    /// As for [`Object::build`], but for the ground.
+    pub fn unproven(spec: &ObjectSpec) -> Result<Self, Error> {
         let mut warnings = Vec::new();
         let body = Self::shape(spec, &mut warnings).map_err(|error| error.about(spec.shape.key()))?;
         Self::assemble(spec, body, warnings, cell::limit())
@@ -173,7 +184,9 @@ impl Object {
             );
         }
         body.check()?;
-        Self::assemble(spec, body, Vec::new(), cell::limit())
+        let object = Self::assemble(spec, body, Vec::new(), cell::limit())?;
+        object.prove()?;
+        Ok(object)
     }
 
     /// `limit`: most memory that a lattice may take whose cubes have no size given (B).
@@ -203,7 +216,7 @@ impl Object {
         }
         let key: Arc<[u8]> = key(&spec, &body).into();
         let Body { nodes, surface_nodes, triangles, tetrahedra, mid_nodes, regions } = body;
-        let object = Self {
+        Ok(Self {
             proven: Cache::used().and_then(|cache| cache.find(&key)?.first().map(|rows| usize::from(*rows))),
             skin: spec.skin.map(|skin| Skin::new(skin, &nodes[..surface_nodes], &triangles)),
             rest: nodes,
@@ -218,24 +231,30 @@ impl Object {
             suitable_cell,
             key,
             mechanics: OnceLock::new(),
-        };
-        if object.proven.is_none() {
-            let rows_per_node = object.mechanics()?.factor.rows_per_node();
-            Cache::used().into_iter().for_each(|cache| cache.keep(&object.key, &[rows_per_node as u8]));
-        }
-        Ok(object)
+        })
     }
 
-    /// What its nodes resist by: formed when the object is built, or, where an earlier run has done so without an error,
-    /// when it is first asked for: what that run has kept may be enough.
+    /// Proves that the ground holds it, where no earlier run has done so: what that run has kept may be enough.
     ///
     /// # Errors
-    /// As for [`Object::build`], when it is first asked for.
+    /// When the ground does not hold it, or there is no memory.
+    pub fn prove(&self) -> Result<(), Error> {
+        if self.proven.is_none() { self.mechanics().map(|_| ()) } else { Ok(()) }
+    }
+
+    /// What its nodes resist by: formed when it is first asked for.
+    ///
+    /// # Errors
+    /// As for [`Object::prove`].
     pub fn mechanics(&self) -> Result<&Mechanics, Error> {
         if let Some(mechanics) = self.mechanics.get() {
             return Ok(mechanics);
         }
         let formed = Arc::new(Mechanics::new(self)?);
+        if self.proven.is_none() {
+            let rows_per_node = formed.factor.rows_per_node() as u8;
+            Cache::used().into_iter().for_each(|cache| cache.keep(&self.key, &[rows_per_node]));
+        }
         Ok(self.mechanics.get_or_init(|| formed))
     }
 

@@ -115,10 +115,14 @@ impl<'object> Graphics<'object> {
         Ok(Self { contact, motion, forces: DrawnForces::new(nodes, spec, relaxation), sum: vec![DVec3::ZERO; nodes] })
     }
 
-    /// One frame with the contact that was `latest`.
-    pub fn frame(&mut self, latest: &Latest) {
+    /// One frame with the contact that was `latest`. An object without dynamics is moved only where the frame
+    /// `is_seen`: what follows does not depend on where it is.
+    pub fn frame(&mut self, latest: &Latest, is_seen: bool) {
         self.forces.touch(&self.contact, latest);
         let [contact, past] = self.forces.frame();
+        if !is_seen && !self.motion.has_dynamics() {
+            return;
+        }
         self.sum.copy_from_slice(contact);
         self.sum.iter_mut().zip(past).for_each(|(sum, past)| *sum += *past);
         self.motion.step(&self.sum);

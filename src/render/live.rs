@@ -15,7 +15,7 @@ use crate::{
     joint_matrix::greatest_eigenvalue,
     object::Object,
     scene::{ContactLaw, EFFECTS, Effect, RelaxationSpec, Scene},
-    sweep::{CpuBackend, Direct, build_object, remark_on_mesh, sample, shallow},
+    sweep::{CpuBackend, Direct, build_object, remark_on_ripple, shallow},
 };
 
 /// Configurations at which the stiffness of the torque is looked at, spread over the grid (1). More: a steeper one is
@@ -71,10 +71,10 @@ impl LiveScene {
     pub fn of(mut scene: Scene, object: Object) -> Result<Self, Error> {
         let follows = scene.contact.law != ContactLaw::Rest;
         scene.contact.law = ContactLaw::Rest;
-        let direct = Direct::of(&scene, object)?;
-        remark_on_mesh(direct.model());
+        let (direct, configurations) = Direct::sampled(&scene, object)?;
+        remark_on_ripple(direct.model());
         let grid = region(&scene, direct.model().compliance.is_whole());
-        let tangents = tangents(direct.model(), &sample(&scene, direct.model()));
+        let tangents = tangents(direct.model(), &configurations);
         Ok(Self { scene, direct, grid, tangents, follows, relaxation: None })
     }
 

@@ -91,6 +91,12 @@ impl<'object> ObjectMotion<'object> {
         Ok(Self { object, mechanics, period, dynamics, stiffening, weight, displacement, right: zero, threads })
     }
 
+    /// Whether it has velocities; none in quasi-static graphics.
+    #[must_use]
+    pub fn has_dynamics(&self) -> bool {
+        self.dynamics.is_some()
+    }
+
     /// T (s).
     #[must_use]
     pub fn period(&self) -> f64 {

@@ -175,7 +175,7 @@ fn draw<'session, 'object>(
             continue;
         }
         let before = frames.due();
-        frames.draw(latest.read());
+        frames.draw(latest.read(), true);
         cost.record(real_time::now() - now);
         if (now.saturating_sub(due)).as_secs_f64() > frames.due() - before {
             missed += 1;

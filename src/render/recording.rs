@@ -152,7 +152,7 @@ impl Recording {
                     latest: &Latest| {
             tick.frames = next.map_or(0, |recorded| recorded.frames);
             if let Some(frames) = &mut frames {
-                (0..tick.frames).for_each(|_| frames.draw(latest));
+                (0..tick.frames).for_each(|_| frames.draw(latest, false));
             }
             next = recorded.next();
             next.into_iter().for_each(|next| befall(controller, next));

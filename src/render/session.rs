@@ -201,15 +201,15 @@ impl<'session, 'object> Frames<'session, 'object> {
         self.shown.len() as f64 * self.graphics.motion().period()
     }
 
-    /// Draws the next frame.
-    pub(super) fn draw(&mut self, latest: &Latest) {
+    /// Draws the next frame, as far as anything depends on it, or, where they are `timed`, as one that is seen.
+    pub(super) fn draw(&mut self, latest: &Latest, timed: bool) {
         let time = self.due();
-        self.graphics.frame(latest);
-        self.shown.push(latest.time);
         let mut wanted = false;
         while self.snapshots.next_if(|&instant| instant <= time).is_some() {
             wanted = true;
         }
+        self.graphics.frame(latest, wanted || timed);
+        self.shown.push(latest.time);
         if wanted {
             let nodes = self.graphics.motion().nodes().collect();
             self.kept.push(Frame { time, proxy: latest.proxy, nodes });
@@ -248,7 +248,7 @@ pub fn run(
         |_: &mut HapticController<'_>, tick: &mut Tick, frames: Option<&mut Frames<'_, '_>>, latest: &Latest| {
             if let Some(frames) = frames {
                 while frames.due() <= tick.time {
-                    frames.draw(latest);
+                    frames.draw(latest, false);
                     tick.frames += 1;
                 }
             }

@@ -19,25 +19,43 @@ use std::{
 /// # Errors
 /// Where it is refused, with its place in the scene.
 pub fn build_object(scene: &Scene) -> Result<Object, Error> {
-    let object = Object::build(&scene.object).and_then(|object| {
-        // Of a larger surface only a part of the compliance is formed, and its size is checked when it is known.
-        if object.surface_nodes <= Model::WHOLE {
-            Compliance::check(&object, object.surface_nodes)?;
-        }
-        Ok(object)
-    });
-    object.map_err(|error| {
-        let checker = Checker { path: &scene.path, text: &scene.text };
-        checker.at(error.key().unwrap_or("object"), &error)
-    })
+    let object = shaped_object(scene)?;
+    prove(scene, &object)?;
+    Ok(object)
 }
 
-/// Remarks, before `model` is solved, on a mesh that shows through and on coarse cubes. Returns the error of the lattice in
-/// its object, where there is one.
-pub fn remark_on_mesh(model: &Model<'_>) -> Option<LatticeError> {
+/// The same for who asks for its surface alone.
+///
+/// # Errors
+/// As [`build_object`], but where the ground does not hold it.
+pub fn shaped_object(scene: &Scene) -> Result<Object, Error> {
+    Object::unproven(&scene.object).map_err(|source| refused(scene, source))
+}
+
+/// Sees to it that the ground of `scene` holds its `object`, and that there is memory to solve contact with it.
+pub(super) fn prove(scene: &Scene, object: &Object) -> Result<(), Error> {
+    // Of a larger surface only a part of the compliance is formed, and its size is checked when it is known.
+    let is_whole = object.surface_nodes <= Model::WHOLE;
+    let check = || if is_whole { Compliance::check(object, object.surface_nodes) } else { Ok(()) };
+    object.prove().and_then(|()| check()).map_err(|source| refused(scene, source))
+}
+
+/// The error of the object of `scene`, with its place there.
+fn refused(scene: &Scene, error: Error) -> Error {
+    let checker = Checker { path: &scene.path, text: &scene.text };
+    checker.at(error.key().unwrap_or("object"), &error)
+}
+
+/// Remarks, before `model` is solved, on a mesh that shows through.
+pub fn remark_on_ripple(model: &Model<'_>) {
     if let Some(remedy) = MeshRipple::new(model).and_then(|ripple| ripple.remedy()) {
         log::warn!("{remedy}");
     }
+}
+
+/// The same, and on coarse cubes. Returns the error of the lattice in its object, where there is one.
+pub fn remark_on_mesh(model: &Model<'_>) -> Option<LatticeError> {
+    remark_on_ripple(model);
     let error = model.object.lattice_error(&model.compliance);
     error.and_then(|error| error.warning()).into_iter().for_each(|warning| log::warn!("{warning}"));
     error
@@ -90,6 +108,11 @@ impl Bake<'_> {
         self.with(|sweep, backend, run| sweep.run(backend, run))
     }
 
+    /// The same with `model`, which knows all that the grid reaches; nobody asks for an error.
+    pub(super) fn tried(self, model: &Model<'_>) -> Result<(Dataset, SweepReport), Error> {
+        self.over(model, |sweep, backend, run| sweep.run(backend, run))
+    }
+
     /// Solves one shard into a file in `folder`; see [`Sweep::bake_shard`].
     ///
     /// # Errors
@@ -120,23 +143,34 @@ impl Bake<'_> {
         self,
         work: impl FnOnce(&mut Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, Error>,
     ) -> Result<T, Error> {
+        let object = build_object(self.scene)?;
+        let chain = Chain::new(&self.scene.proxy);
+        let model = model_of(self.scene, &object, &chain)?;
+        self.over(&model, |sweep, backend, run| {
+            sweep.lattice = remark_on_mesh(&model);
+            sweep.warnings.extend(sweep.lattice.and_then(|error| error.warning()));
+            work(sweep, backend, run)
+        })
+    }
+
+    /// The same with `model`, which knows all that the grid reaches.
+    fn over<T>(
+        self,
+        model: &Model<'_>,
+        work: impl FnOnce(&mut Sweep<'_>, &mut ChosenBackend<'_>, Run<'_>) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         let Self { scene, backend, measured, aim, date, stop, progress } = self;
-        let object = build_object(scene)?;
-        let chain = Chain::new(&scene.proxy);
-        let model = model_of(scene, &object, &chain)?;
         let at_first = backend.for_work(0.0);
-        let mut chosen = ChosenBackend::open(at_first, &model)?;
-        let mut sweep = sweep_of(scene, &object, &model, [chosen.name(), &chosen.adapter(), date], measured)?;
+        let mut chosen = ChosenBackend::open(at_first, model)?;
+        let mut sweep = sweep_of(scene, model, [chosen.name(), &chosen.adapter(), date], measured)?;
         if at_first != backend {
             let better = backend.for_work(sweep.predict(&mut chosen, true)?);
             if better != at_first {
-                chosen = ChosenBackend::open(better, &model)?;
+                chosen = ChosenBackend::open(better, model)?;
                 sweep.solved_by(&chosen);
             }
         }
         sweep.binding.provenance.aim = aim;
-        sweep.lattice = remark_on_mesh(&model);
-        sweep.warnings.extend(sweep.lattice.and_then(|error| error.warning()));
         let run = Run { chunk: chosen.chunk(), stop, progress };
         work(&mut sweep, &mut chosen, run)
     }
@@ -145,21 +179,25 @@ impl Bake<'_> {
 /// The model by which the grid of `scene` is solved.
 pub(crate) fn model_of<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, Error> {
     let mut model = model_within(scene, object, chain)?;
-    model.with_tangent = scene.uses_tangent();
-    model.with_slip = scene.haptics.uses_slip();
+    add_extras(&mut model, scene);
     Ok(model)
 }
 
-/// The sweep of `scene`, whose object and model these are, with all that a dataset is to say; `solved` are backend,
-/// adapter and date, and `measured` is as in [`Bake::measured`].
+/// Lets `model` solve what a dataset of `scene` holds beside torques.
+pub(super) fn add_extras(model: &mut Model<'_>, scene: &Scene) {
+    model.with_tangent = scene.uses_tangent();
+    model.with_slip = scene.haptics.uses_slip();
+}
+
+/// The sweep of `scene`, whose model this is, with all that a dataset is to say; `solved` are backend, adapter and date,
+/// and `measured` is as in [`Bake::measured`].
 pub(crate) fn sweep_of<'a>(
     scene: &Scene,
-    object: &Object,
     model: &'a Model<'a>,
     solved: [&str; 3],
     measured: Option<usize>,
 ) -> Result<Sweep<'a>, Error> {
-    let mut sweep = Sweep::new(scene, object, solved[0], solved[1], solved[2])?;
+    let mut sweep = Sweep::new(scene, model.object, solved[0], solved[1], solved[2])?;
     sweep.diagnose(model);
     sweep.skip_free_space(model)?;
     sweep.find_lowest(model)?;

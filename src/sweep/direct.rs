@@ -1,9 +1,9 @@
 //! Equilibria solved directly, wherever they are asked for: what a program calls that has no dataset, or wants to check
 //! one.
 
-use super::{Inspection, build_object, model_within};
+use super::{Inspection, build_object, region::sampled, shaped_object};
 use crate::{
-    Error,
+    Error, JointVector,
     contact::{Model, Solvers, Status},
     error,
     field::check_rows,
@@ -40,8 +40,27 @@ impl Direct {
     /// # Errors
     /// When its compliance cannot be formed.
     pub fn of(scene: &Scene, object: Object) -> Result<Self, Error> {
-        Prepared::try_new((object, Chain::new(&scene.proxy)), |(object, chain)| model_within(scene, object, chain))
-            .map(Self)
+        Self::sampled(scene, object).map(|(direct, _)| direct)
+    }
+
+    /// The same, and configurations that stand for all that it is prepared for.
+    pub(crate) fn sampled(scene: &Scene, object: Object) -> Result<(Self, Vec<JointVector>), Error> {
+        let mut configurations = Vec::new();
+        let prepared = Prepared::try_new((object, Chain::new(&scene.proxy)), |(object, chain)| {
+            let (model, sample) = sampled(scene, object, chain)?;
+            configurations = sample;
+            Ok::<_, Error>(model)
+        })?;
+        Ok((Self(prepared), configurations))
+    }
+
+    /// Object and proxy of `scene` without a compliance: for who asks where they are, and solves nothing yet.
+    ///
+    /// # Errors
+    /// When the object is refused.
+    pub fn at_rest(scene: &Scene) -> Result<Self, Error> {
+        let parts = (shaped_object(scene)?, Chain::new(&scene.proxy));
+        Prepared::try_new(parts, |(object, chain)| Model::reaching(object, chain, scene.contact, &[])).map(Self)
     }
 
     /// The object and the proxy, prepared.

@@ -148,7 +148,7 @@ impl Merge {
         let (object, chain) = (build_object(&scene)?, Chain::new(&scene.proxy));
         let model = model_of(&scene, &object, &chain)?;
         let by = [&binding.provenance.backend, &binding.provenance.adapter, &binding.provenance.date];
-        let sweep = sweep_of(&scene, &object, &model, by.map(String::as_str), measured)?;
+        let sweep = sweep_of(&scene, &model, by.map(String::as_str), measured)?;
         if let Some(difference) = sweep.binding.other_sweep(&binding) {
             return Err(different(&first.path, &scene.path, difference));
         }

@@ -36,7 +36,7 @@ pub(crate) mod thin_parts;
 mod tile;
 
 pub use crate::contact::Backend;
-pub use bake::{Bake, baked, build_object, remark_on_mesh};
+pub use bake::{Bake, baked, build_object, remark_on_mesh, remark_on_ripple, shaped_object};
 #[cfg(feature = "viewer")]
 pub(crate) use bake::{model_of, sweep_of};
 #[cfg(feature = "viewer")]
@@ -60,6 +60,7 @@ pub use plan::{Plan, ShardCost};
 pub(crate) use reach::shallow;
 pub use reach::{DepthShare, JointReach, Reach};
 pub use reference::{REFERENCE_TOLERANCE, Reference};
-pub use region::{model_within, sample};
+pub use region::model_within;
+use region::sample;
 pub use report::{Iterations, SweepReport};
 pub use shard::{EXTENSION as SHARD_EXTENSION, Shard, ranges};

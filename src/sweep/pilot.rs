@@ -8,14 +8,19 @@
 //! are relative to the rms of the torque itself. Where torque jumps, the worst error is as large as the jump on any
 //! grid: it is reported, and not promised.
 
-use super::{BackendChoice, Bake, build_object, grid_sweep::check_given, model_within, reference::Reference, spacing};
+use super::{
+    BackendChoice, Bake,
+    bake::{add_extras, prove},
+    grid_sweep::check_given,
+    reference::Reference,
+    sample, spacing,
+};
 use crate::{
     Error,
     contact::Model,
     error,
     field::TorqueField,
     names::counted,
-    proxy::Chain,
     scene::{ContactSpec, EffortNorm, HapticsSpec, Interpolation, NormUnit, Scene},
 };
 use serde::Serialize;
@@ -200,16 +205,28 @@ pub struct Choice {
 }
 
 impl Pilot {
-    /// Tries `scene` for `aim`.
+    /// Tries `scene` for `aim`, `model` being its object and its arm, without a compliance.
     ///
     /// # Errors
     /// When the scene has no grid, or a coarse one cannot be baked, or there is nothing to compare with.
-    pub fn run(scene: &Scene, aim: Aim, backend: BackendChoice, stop: &AtomicBool) -> Result<Self, Error> {
+    pub fn run(
+        scene: &Scene,
+        model: &Model<'_>,
+        aim: Aim,
+        backend: BackendChoice,
+        stop: &AtomicBool,
+    ) -> Result<Self, Error> {
         check_given(scene)?;
         let aim = aim.checked(scene)?;
-        let (object, chain) = (build_object(scene)?, Chain::new(&scene.proxy));
-        let model = model_within(scene, &object, &chain)?;
+        prove(scene, model.object)?;
+        let mut model = model.clone();
+        model.reach(&sample(scene, &model))?;
         let reference = Reference::in_contact(scene, &model, SEED, CONTACTS)?;
+        let torque = reference.torque;
+        let relative = aim.relative(torque);
+        let aim = relative * torque;
+        let tolerance = tolerance(scene, &model, &reference, SOLVER_SHARE * aim)?;
+        add_extras(&mut model, scene);
         let joints = scene.grid.axes.len();
         let finest = (spacing::points(scene) as f64 / PILOT_POINTS).powf(1.0 / joints as f64).max(1.0);
         let (mut trials, mut seconds_per_point, mut bytes_per_point) = (Vec::new(), 0.0, 0.0);
@@ -223,7 +240,7 @@ impl Pilot {
             let start = Instant::now();
             let bake =
                 Bake { scene: &spaced, backend, measured: Some(0), aim: None, date: "", stop, progress: &mut |_| () };
-            let (dataset, report) = bake.in_memory()?;
+            let (dataset, report) = bake.tried(&model)?;
             if trials.is_empty() {
                 seconds_per_point = start.elapsed().as_secs_f64() / points as f64;
                 let bytes = report.forecast.map_or(report.footprint.memory.least, |forecast| forecast.disk);
@@ -237,9 +254,6 @@ impl Pilot {
                 trials.push(Trial { interpolation, spacing, points, rms, worst });
             }
         }
-        let torque = reference.torque;
-        let relative = aim.relative(torque);
-        let aim = relative * torque;
         Ok(Self {
             aim,
             relative,
@@ -248,7 +262,7 @@ impl Pilot {
             configurations: reference.exact.len(),
             in_contact: reference.in_contact,
             prospects: prospects(&trials, SPACING_SHARE * aim, joints),
-            tolerance: tolerance(scene, &model, &reference, SOLVER_SHARE * aim)?,
+            tolerance,
             trials,
             seconds_per_point,
             bytes_per_point,

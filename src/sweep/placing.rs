@@ -1,6 +1,6 @@
 //! An arm put before an object: where its tip is, how far the object is from it, and a press of one on the other.
 
-use super::{build_object, grid_sweep::check_axes, region::drawn};
+use super::{grid_sweep::check_axes, region::drawn, shaped_object};
 use crate::{
     Error, JointVector,
     contact::{Model, Proximity},
@@ -71,7 +71,7 @@ impl Placing {
             return Ok(None);
         }
         check_axes(scene)?;
-        Self::from(scene, &build_object(scene)?, wanted, None).map(Some)
+        Self::from(scene, &shaped_object(scene)?, wanted, None).map(Some)
     }
 
     /// Puts the tip before the point of the surface that is nearest to it at `q`, and begins from there. `None` where the
@@ -85,7 +85,7 @@ impl Placing {
         let mut pose = chain.new_pose();
         chain.pose(q, &mut pose);
         check_axes(scene)?;
-        Self::from(scene, &build_object(scene)?, Some(pose.nodes[tip]), Some((tip, *q))).map(Some)
+        Self::from(scene, &shaped_object(scene)?, Some(pose.nodes[tip]), Some((tip, *q))).map(Some)
     }
 
     /// Moves the object of `scene` before the tip of its arm, to be pressed from above where the arm does that easily.
@@ -96,7 +96,7 @@ impl Placing {
     /// When the object is refused.
     pub fn brought(scene: &Scene) -> Result<Option<(DVec3, Self)>, Error> {
         check_axes(scene)?;
-        let (mut object, chain) = (build_object(scene)?, Chain::new(&scene.proxy));
+        let (mut object, chain) = (shaped_object(scene)?, Chain::new(&scene.proxy));
         let body = corners(&object.rest[..object.surface_nodes]);
         let standoff = PRESS_GAP * length(body);
         let mut best: Option<(Posture, DVec3, DVec3, f64)> = None;

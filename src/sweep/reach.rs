@@ -5,7 +5,7 @@
 //! most as deep as asked for; the grid's ranges are the least box that holds all of it that was met. Its lines are so
 //! far apart that a step along any axis moves the proxy by about as much as along any other.
 
-use super::{build_object, grid_sweep::check_axes, region::drawn, spacing};
+use super::{grid_sweep::check_axes, region::drawn, spacing};
 use crate::{
     Error, ErrorKind, JointVector,
     contact::{Model, NodeTree},
@@ -117,19 +117,15 @@ struct Met {
 }
 
 impl Reach {
-    /// Measures `scene`, whose grid does not matter; `depth` is that of the contact that the ranges are to hold, by
-    /// default a fifth of the body's size (m).
+    /// Measures `scene`, whose grid does not matter, `model` being its object and its arm, of which no compliance is
+    /// needed. `depth` is that of the contact that the ranges are to hold, by default a fifth of the body's size (m).
     ///
     /// # Errors
-    /// When the object is refused, nothing touches, or `stop` is raised.
-    pub fn new(scene: &Scene, depth: Option<f64>, stop: &AtomicBool) -> Result<Self, Error> {
+    /// When the arm has too many joints, nothing touches, or `stop` is raised.
+    pub fn new(scene: &Scene, model: &Model<'_>, depth: Option<f64>, stop: &AtomicBool) -> Result<Self, Error> {
         check_axes(scene)?;
-        let object = build_object(scene)?;
-        let chain = Chain::new(&scene.proxy);
-        // No compliance is needed where nothing is solved.
-        let model = Model::reaching(&object, &chain, scene.contact, &[])?;
-        let (tree, body) = (NodeTree::new(&chain), size(&object));
-        let shallow = depth.unwrap_or_else(|| self::shallow(&object));
+        let (tree, body) = (NodeTree::new(model.chain), size(model.object));
+        let shallow = depth.unwrap_or_else(|| self::shallow(model.object));
         let is_shallow = |met: &Met| met.gap < 0.0 && -met.gap <= shallow;
         let mut random = Random::new(SEED);
         let mut met: Vec<Met> = Vec::new();
@@ -137,7 +133,7 @@ impl Reach {
             if stop.load(Ordering::Relaxed) {
                 return Err(error!("stopped; nothing was written").of(ErrorKind::Stopped));
             }
-            met.extend(measured(&model, &tree, scene, &mut random));
+            met.extend(measured(model, &tree, scene, &mut random));
             if met.iter().filter(|met| is_shallow(met)).count() >= CONTACTS {
                 break;
             }

@@ -27,15 +27,24 @@ const ROUNDS: usize = 16;
 /// # Errors
 /// As [`Model::reaching`].
 pub fn model_within<'a>(scene: &Scene, object: &'a Object, chain: &'a Chain) -> Result<Model<'a>, Error> {
+    sampled(scene, object, chain).map(|(model, _)| model)
+}
+
+/// The same, and the [configurations](sample) that stand for the region.
+pub(super) fn sampled<'a>(
+    scene: &Scene,
+    object: &'a Object,
+    chain: &'a Chain,
+) -> Result<(Model<'a>, Vec<JointVector>), Error> {
     let mut model = Model::reaching(object, chain, scene.contact, &[])?;
-    model.reach(&sample(scene, &model))?;
-    Ok(model)
+    let configurations = sample(scene, &model);
+    model.reach(&configurations)?;
+    Ok((model, configurations))
 }
 
 /// Configurations that stand for the region of `scene`, whose `model` may know no compliance: spread over it, all points
 /// of a grid that has few, and, where contact is rare among them, random ones in contact.
-#[must_use]
-pub fn sample(scene: &Scene, model: &Model<'_>) -> Vec<JointVector> {
+pub(super) fn sample(scene: &Scene, model: &Model<'_>) -> Vec<JointVector> {
     let (mut configurations, is_all) = spread(scene);
     if is_all {
         return configurations;

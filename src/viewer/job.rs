@@ -268,7 +268,7 @@ fn bake(
         }
     };
     let date = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
-    let mut sweep = sweep_of(&scene, &object, &model, [backend.name(), &backend.adapter(), &date], None)?;
+    let mut sweep = sweep_of(&scene, &model, [backend.name(), &backend.adapter(), &date], None)?;
     if let Some(device) = for_long_work
         && is_worth_a_gpu(sweep.predict(&mut backend, true)?)
         // Where the GPU cannot take the scene the CPU can.

@@ -108,6 +108,15 @@ fn baked(scene: &Scene) -> Dataset {
     dataset
 }
 
+/// The other scenes that ship are held to it where they are felt.
+#[test]
+fn a_mesh_and_a_nodule_are_passive_as_they_ship() {
+    for name in ["mesh.toml", "nodule.toml"] {
+        let setup = Setup::new(&baked(&Scene::load(shipped(name)).unwrap())).unwrap();
+        assert!(setup.exceeded.is_empty(), "{name}: {:?}", setup.exceeded);
+    }
+}
+
 /// The scene is baked, and pressed and scraped by a device of at most `most` (N m).
 fn feels(name: &str, most: f64) {
     let scene = Scene::load(shipped(name)).unwrap();
@@ -228,6 +237,7 @@ fn scenes_are_felt_at_once_and_replayed_as_they_were_felt() {
         assert!(whole && felt["contact_share"].as_f64().unwrap() > 0.05, "{told} {felt:#}");
         assert!(felt["max_relative_account_residual"].as_f64().unwrap() < 1e-9, "{felt:#}");
         assert_eq!(felt["unconverged"], 0, "{felt:#}");
+        assert!(!told.contains("not passive"), "{told}");
         let follows = Scene::load(&scene).unwrap().contact.law != ContactLaw::Rest;
         assert_eq!(told.contains("law that follows the deformation"), follows, "{told}");
         let (whole, told, again) = run(&["play", &scene, "--replay", "session.csv", "--json"]);

@@ -92,10 +92,8 @@ fn spheres_have_the_papers_grid() {
 
 #[test]
 fn shipped_motions_stay_within_the_grid() {
-    for name in
-        ["paper.toml", "sphere.toml", "mesh.toml", "organ.toml", "touch.toml", "two_diy.toml", "woodenhaptics.toml"]
-    {
-        let scene = shipped(name);
+    for name in ["paper", "sphere", "mesh", "organ", "nodule", "touch", "two_diy", "woodenhaptics"] {
+        let scene = shipped(&format!("{name}.toml"));
         assert!(!scene.motion.press.is_empty() && !scene.motion.scrape.is_empty(), "{name}");
         for waypoint in scene.motion.press.iter().chain(&scene.motion.scrape) {
             for (value, axis) in waypoint.q.iter().zip(&scene.grid.axes) {

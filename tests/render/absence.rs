@@ -71,7 +71,7 @@ impl Baked {
     fn drawn(&self, places: &[(JointVector, f64)]) -> Vec<Vec<DVec3>> {
         let mut graphics = self.setup.graphics(&self.data).unwrap().unwrap();
         let frame = |(q, share): &(JointVector, f64)| {
-            graphics.frame(&Latest { proxy: *q, share: *share, ..Latest::default() });
+            graphics.frame(&Latest { proxy: *q, share: *share, ..Latest::default() }, true);
             graphics.motion().nodes().collect()
         };
         places.iter().map(frame).collect()
@@ -153,6 +153,32 @@ fn each_effect_changes_its_own_loop_and_no_bit_of_the_other() {
         let named = with(true, &[effect]);
         assert_eq!(bits(&named.felt().ticks) == felt, effect.is_drawn(), "a tick with {}", effect.key);
         assert_eq!(bits(&named.drawn(&places)) == drawn, !effect.is_drawn(), "a frame with {}", effect.key);
+    }
+}
+
+/// Frames that are not seen change nothing in what is seen later: memory and inertia go on.
+#[test]
+fn frames_that_are_not_seen_leave_their_traces() {
+    let effect = |key: &str| EFFECTS.into_iter().find(|effect| effect.key == key).unwrap();
+    for effects in [&[effect("quasi_static"), effect("smoothing")][..], &[effect("smoothing")]] {
+        let named = with(true, effects);
+        let places = named.places(&named.felt());
+        let last = |is_seen: bool| {
+            let mut graphics = named.setup.graphics(&named.data).unwrap().unwrap();
+            for (k, (q, share)) in places.iter().enumerate().take(100) {
+                let latest = Latest { proxy: *q, share: *share, ..Latest::default() };
+                graphics.frame(&latest, is_seen || k == 99);
+            }
+            graphics.motion().nodes().collect::<Vec<_>>()
+        };
+        let seen = last(true);
+        assert!(seen.iter().zip(&named.setup.object.as_ref().unwrap().rest).any(|(n, rest)| n.distance(*rest) > 1e-4));
+        assert_eq!(
+            bits(&last(false)),
+            bits(&seen),
+            "{:?}",
+            effects.iter().map(|effect| effect.key).collect::<Vec<_>>()
+        );
     }
 }
 

@@ -10,7 +10,7 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::Scene,
-    sweep::{Aim, Backend, BackendChoice, CpuBackend, Pilot},
+    sweep::{Aim, Backend, BackendChoice, CpuBackend, Direct, Pilot},
 };
 use serde_json::Value;
 use std::{path::Path, sync::atomic::AtomicBool};
@@ -175,7 +175,8 @@ fn an_aim_that_was_missed_is_told_and_kept_in_the_file() {
     let folder = Folder::new();
     let scene = Scene::parse(&text(), "a.toml").unwrap();
     let stop = AtomicBool::new(false);
-    let pilot = Pilot::run(&scene, Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
+    let direct = Direct::at_rest(&scene).unwrap();
+    let pilot = Pilot::run(&scene, direct.model(), Aim::Relative(0.05), BackendChoice::Cpu, &stop).unwrap();
     let choice = pilot.choose(&scene, usize::MAX).unwrap();
     assert!(pilot.prospects.iter().all(|prospect| prospect.points >= pilot.prospects[0].points));
     assert!(pilot.choose(&scene, 10).is_err());

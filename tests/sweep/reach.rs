@@ -1,6 +1,10 @@
 //! Where contact is, against what the geometry says.
 
-use haptize::{Error, ErrorKind, scene::Scene, sweep::Reach};
+use haptize::{
+    Error, ErrorKind,
+    scene::Scene,
+    sweep::{Direct, Reach},
+};
 use std::sync::atomic::AtomicBool;
 
 /// A ball of 10 mm on two slides before a sphere of 50 mm: one pushes it against the sphere's side, one lifts it past.
@@ -27,8 +31,12 @@ nodes = [{ at = [0.06, 0, 0], radius = 0.01 }]
 /// How far the polyhedron is inside of the sphere, and a range's margin beyond contact (m).
 const SLACK: f64 = 0.004;
 
+fn measured(scene: &Scene, depth: Option<f64>, is_stopped: bool) -> Result<Reach, Error> {
+    Reach::new(scene, Direct::at_rest(scene)?.model(), depth, &AtomicBool::new(is_stopped))
+}
+
 fn reach(depth: f64) -> Result<Reach, Error> {
-    Reach::new(&Scene::parse(SCENE, "ball.toml").unwrap(), Some(depth), &AtomicBool::new(false))
+    measured(&Scene::parse(SCENE, "ball.toml").unwrap(), Some(depth), false)
 }
 
 #[test]
@@ -75,15 +83,15 @@ fn depth_sets_the_range_and_no_contact_is_refused() {
     let middle = SCENE.replace("limits = [-0.1, 0.1]", "limits = [-0.01, 0.01]");
     let middle = Scene::parse(&middle, "middle.toml").unwrap();
     for depth in [0.02, 0.002_f64] {
-        let found = Reach::new(&middle, Some(depth), &AtomicBool::new(false)).unwrap();
+        let found = measured(&middle, Some(depth), false).unwrap();
         let end = 0.06 - ((0.06 - depth).powi(2) - 0.01_f64.powi(2)).sqrt();
         assert!((found.joints[0].range[1] - end).abs() < 0.002, "{depth}: {found:?}, not {end}");
         assert!((found.shallow, found.deepest) >= (depth, 0.9 * depth), "{found:?}");
     }
     let free = SCENE.replace("at = [0.06, 0, 0]", "at = [0.06, 0.2, 0]");
-    let refused = Reach::new(&Scene::parse(&free, "free.toml").unwrap(), None, &AtomicBool::new(false)).unwrap_err();
+    let refused = measured(&Scene::parse(&free, "free.toml").unwrap(), None, false).unwrap_err();
     assert!(refused.to_string().contains("widen the limits"), "{refused}");
-    let stopped = Reach::new(&Scene::parse(SCENE, "ball.toml").unwrap(), None, &AtomicBool::new(true)).unwrap_err();
+    let stopped = measured(&Scene::parse(SCENE, "ball.toml").unwrap(), None, true).unwrap_err();
     assert_eq!(stopped.kind(), ErrorKind::Stopped);
 }
 
