@@ -23,7 +23,6 @@ use std::{
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
-    thread,
     time::SystemTime,
 };
 
@@ -184,17 +183,6 @@ impl Job {
         }
     }
 
-    /// Waits until it is over.
-    #[must_use]
-    pub fn wait(mut self) -> JobResult {
-        loop {
-            if let Some(outcome) = self.poll() {
-                return outcome;
-            }
-            thread::sleep(std::time::Duration::from_millis(2));
-        }
-    }
-
     /// Returns how far it has come.
     #[must_use]
     pub fn progress(&self) -> Progress {
@@ -289,15 +277,23 @@ mod tests {
     use super::*;
     use crate::{object::Object, scene::Placement, scene::Shape};
 
+    /// How `task` ends on `solver`.
+    fn done(task: Task, solver: Solver, context: &Arc<Context>) -> JobResult {
+        let (wake, woken) = mpsc::channel();
+        let mut job = Job::begin(task, solver, Arc::clone(context), move || {
+            let _ = wake.send(());
+        })
+        .unwrap();
+        woken.iter().find_map(|()| job.poll()).unwrap()
+    }
+
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let gone = AdapterSummary { name: "Unplugged (1)".into(), ..context.adapter().clone() };
         let task = Task::Bake(Arc::new(scene), None);
-        let JobResult::Failed(why) =
-            Job::begin(task, Solver::Adapter(gone), Arc::clone(&context), || ()).unwrap().wait()
-        else {
+        let JobResult::Failed(why) = done(task, Solver::Adapter(gone), &context) else {
             panic!("an adapter that is not there baked")
         };
         assert!(why.contains("Unplugged") && why.contains(&context.adapter().name), "{why}");
@@ -312,10 +308,7 @@ mod tests {
         let file = "gone.obj".into();
         scene.object.shape = Shape::Mesh { file, placement: Placement::METRES, refine: None };
         scene.grid.axes.iter_mut().for_each(|axis| axis.count = 2);
-        let bake = |surface| {
-            let task = Task::Bake(Arc::new(scene.clone()), surface);
-            Job::begin(task, Solver::Cpu, Arc::clone(&context), || ()).unwrap().wait()
-        };
+        let bake = |surface| done(Task::Bake(Arc::new(scene.clone()), surface), Solver::Cpu, &context);
         assert!(matches!(bake(Some(surface)), JobResult::Loaded(_)));
         assert!(matches!(bake(None), JobResult::Failed(why) if why.contains("gone.obj")));
     }

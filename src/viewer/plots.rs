@@ -129,7 +129,7 @@ impl Plots {
                 }
                 let why = "The window holds still for two seconds while the loop goes on: the jitter that is left is \
                            the machine's own, what is more is the window's";
-                let clocked = history.cost().percentiles().count > 0;
+                let clocked = history.cost.percentiles().count > 0;
                 asked.hold_still = ui.add_enabled(clocked, Button::new("Hold still")).on_hover_text(why).clicked();
             }
         });
@@ -303,7 +303,7 @@ impl Plots {
             write("viewer-press", &report::press::press(&trace))?,
             write("viewer-energy", &report::press::energy(&trace))?,
         ];
-        if history.jitter().percentiles().count > 0 {
+        if history.jitter.percentiles().count > 0 {
             files.push(write("viewer-jitter", &report::jitter::jitter(&history.timing()))?);
         }
         let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
@@ -361,13 +361,13 @@ fn timing(ui: &mut Ui, history: &History) {
     let dark = ui.visuals().dark_mode;
     let size = vec2(0.5 * (ui.available_width() - GROUP_GAP), ui.available_height());
     ui.horizontal_top(|ui| {
-        for (number, title, durations) in [(0, "jitter", history.jitter()), (1, "cost of a tick", history.cost())] {
+        for (number, title, durations) in [(0, "jitter", &history.jitter), (1, "cost of a tick", &history.cost)] {
             ui.allocate_ui(size, |ui| {
                 ui.vertical(|ui| {
                     let words = shares(durations).unwrap_or_else(|| "nothing measured, the loop runs by steps".into());
                     ui.label(RichText::new(format!("{title} [µs]: {words}")).small());
                     if number == 0 {
-                        let words = shares(history.still()).unwrap_or_else(|| "not measured yet".into());
+                        let words = shares(&history.still).unwrap_or_else(|| "not measured yet".into());
                         ui.label(RichText::new(format!("the window holding still: {words}")).weak().small());
                     }
                     let bars: Vec<Bar> = durations

@@ -16,7 +16,7 @@ use super::{
     probe::pick,
     readout::Readout,
     shapes::Shape,
-    steering::{Side, Steering},
+    steering::Steering,
     theme::{FINE_GAP, GROUP_GAP},
     view_renderer::{Look, Quantity, ViewRenderer},
 };
@@ -57,7 +57,8 @@ pub struct SceneView {
     render: RenderState,
     stage: ViewRenderer,
     texture: Option<(egui::TextureId, [usize; 2])>,
-    steering: Steering,
+    /// Whence it is seen.
+    pub steering: Steering,
     body: Option<Body>,
     /// Shapes of the arm's links, where it has any.
     links: Option<Links>,
@@ -180,19 +181,6 @@ impl SceneView {
         self.redrawing.is_busy()
     }
 
-    /// Waits until the object is drawn with `effects`; for pictures and tests.
-    ///
-    /// # Errors
-    /// As [`SceneView::follow`].
-    pub fn wait(&mut self, loaded: &Loaded, effects: &GraphicsEffects) -> Result<(), ViewError> {
-        self.follow(loaded, effects, || ())?;
-        while let Some(body) = self.redrawing.wait().map_err(ViewError::Open)? {
-            self.body = body?;
-            self.follow(loaded, effects, || ())?;
-        }
-        Ok(())
-    }
-
     /// Lets `elapsed` (s) go by with the loop at `latest`.
     ///
     /// # Errors
@@ -283,16 +271,6 @@ impl SceneView {
     /// From where the object is to where it is being moved.
     fn frame(&self) -> DAffine3 {
         self.placement.as_ref().map_or(DAffine3::IDENTITY, ObjectPlace::frame)
-    }
-
-    /// Looks from where one looked first.
-    pub fn reset_view(&mut self) {
-        self.steering.reset();
-    }
-
-    /// Looks from `side`.
-    pub fn look_from(&mut self, side: Side) {
-        self.steering.look_from(side);
     }
 
     /// Sees the object of `loaded` and the tip of the arm whole, and no more.
