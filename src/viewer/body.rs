@@ -49,8 +49,6 @@ enum Motion {
 
 struct HostMotion {
     moved: MovedObject,
-    /// Forces of contact and of the object's past (N).
-    sum: Vec<DVec3>,
     context: Arc<Context>,
     /// Displacements (m) and contact forces (N) of the object's nodes, four numbers a node.
     drawn: [wgpu::Buffer; 2],
@@ -132,10 +130,14 @@ impl Body {
         self.owed -= due * self.period;
         let began = Instant::now();
         for _ in 0..(due as usize).min(MOST_FRAMES) {
-            let [contact, past] = self.forces.frame();
+            let forces = self.forces.frame();
             match &mut self.motion {
-                Motion::Device(update) => update.step(contact)?,
-                Motion::Host(host) if began.elapsed() < MOST_TIME => host.step(contact, past),
+                Motion::Device(update) => update.step(forces)?,
+                Motion::Host(host) if began.elapsed() < MOST_TIME => {
+                    host.moved.with_dependent_mut(|_, motion| {
+                        motion.step(forces);
+                    });
+                }
                 Motion::Host(_) => {}
             }
         }
@@ -195,19 +197,9 @@ impl HostMotion {
         };
         let drawn =
             context.scoped(|device| ["drawn displacements", "drawn forces"].map(|label| buffer(device, label)))?;
-        let host = Self { moved, sum: vec![DVec3::ZERO; nodes], context: Arc::clone(context), drawn };
+        let host = Self { moved, context: Arc::clone(context), drawn };
         host.show(&[])?;
         Ok(host)
-    }
-
-    /// One frame under forces of `contact` and of the `past` (N).
-    fn step(&mut self, contact: &[DVec3], past: &[DVec3]) {
-        let Self { moved, sum, .. } = self;
-        sum.copy_from_slice(contact);
-        sum.iter_mut().zip(past).for_each(|(sum, past)| *sum += *past);
-        moved.with_dependent_mut(|_, motion| {
-            motion.step(sum);
-        });
     }
 
     /// Gives the device the nodes as they are, and the forces of `contact` on them (N).

@@ -4,6 +4,7 @@
 use super::{
     Start, TickSource, ViewError, Viewer, dress,
     film::{Film, PERIOD},
+    pipelines::{FORMAT, target},
     pixels, theme,
 };
 use crate::{
@@ -54,7 +55,7 @@ const SETTLING: usize = 3;
 /// When the device refuses it.
 pub fn render_state(context: &Context) -> Result<RenderState, ViewError> {
     let (instance, adapter, device, queue) = context.shared();
-    let target_format = super::pipelines::FORMAT;
+    let target_format = FORMAT;
     let renderer = context.scoped(|device| Renderer::new(device, target_format, RendererOptions::PREDICTABLE))?;
     Ok(RenderState {
         available_adapters: vec![adapter.clone()],
@@ -167,16 +168,7 @@ fn paint(
                 renderer.update_texture(device, &render.queue, id, &image);
             }
         }
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("window"),
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: render.target_format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let texture = target(device, "window", size, render.target_format, 1, wgpu::TextureUsages::COPY_SRC);
         let view = texture.create_view(&Default::default());
         let mut encoder = device.create_command_encoder(&Default::default());
         let mut commands = renderer.update_buffers(device, &render.queue, &mut encoder, &triangles, &screen);

@@ -3,6 +3,7 @@
 use super::{
     app::{Viewer, not_drawn},
     feel::TickSource,
+    files::Files,
     guide::Guide,
     job::{Job, Task, short},
     lead::Lead,
@@ -250,7 +251,7 @@ impl Viewer {
         let narrow = size.x < NARROW;
         let mut written = None;
         if narrow {
-            written = plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+            written = plots_panel(ui, side, below, &mut self.plots, session, &self.files);
         }
         Panel::left("controls")
             .frame(side)
@@ -274,7 +275,7 @@ impl Viewer {
             session.configuration_space(ui, &q);
         });
         if !narrow {
-            written = plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+            written = plots_panel(ui, side, below, &mut self.plots, session, &self.files);
         }
         let shows_steps = &mut self.shows_steps;
         CentralPanel::no_frame().show(ui, |ui| {
@@ -398,10 +399,10 @@ fn plots_panel(
     height: f32,
     plots: &mut Plots,
     session: &mut Session,
-    folder: &Path,
+    files: &Files,
 ) -> Option<Result<String, String>> {
     let panel = Panel::bottom("plots").frame(frame).resizable(true).default_size(height);
-    let asked = panel.show(ui, |ui| plots.show(ui, &session.loaded, &mut session.history, folder)).inner;
+    let asked = panel.show(ui, |ui| plots.show(ui, &session.loaded, &mut session.history, files)).inner;
     if asked.hold_still {
         session.history.hold_still(&mut session.feel);
     }
