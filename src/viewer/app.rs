@@ -55,8 +55,8 @@ impl Start {
         };
         let remedy = "give a scene (.toml) or a dataset (.haptize)";
         files.into_iter().try_for_each(|path| {
-            let unreadable = |error| ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()));
-            input::open(path).map(drop).map_err(unreadable)
+            let unreadable = |error| format!("{}: cannot be read: {error}; {remedy}", path.display());
+            input::open(path).map(drop).map_err(|error| unreadable(error).into())
         })
     }
 }
@@ -393,7 +393,7 @@ impl Viewer {
             Some(session) => self.scene.picture(size, &session.loaded, visuals)?,
             None => None,
         };
-        picture.ok_or_else(|| ViewError::Open("nothing is open".into()))
+        picture.ok_or_else(|| Error::from("nothing is open").into())
     }
 
     /// Begins a film of the 3-D picture, or ends it.

@@ -11,7 +11,7 @@ pub struct Pending<T> {
 }
 
 /// Message for a thread that ended without its result.
-pub const ENDED: &str = "the work ended unexpectedly; please report this";
+const ENDED: &str = "the work ended unexpectedly; please report this";
 
 impl<T: Send + 'static> Pending<T> {
     /// Begins to `make` it in a thread called `name`; `wake` is called once it is there.

@@ -8,6 +8,7 @@ use super::{
     pixels, theme,
 };
 use crate::{
+    Error,
     dataset::replace_file,
     draw::canvas::encode_png,
     gpu::{AdapterChoice, Context, GpuError},
@@ -88,9 +89,9 @@ impl Stage {
         viewer.start(start, &egui);
         viewer.wait();
         if let Some(error) = viewer.error() {
-            return Err(ViewError::Open(error.to_owned()));
+            return Err(error.to_owned().into());
         }
-        viewer.begin_motion(picture.motion.as_deref()).map_err(ViewError::Open)?;
+        viewer.begin_motion(picture.motion.as_deref())?;
         Ok(Self { context, render, egui, viewer })
     }
 }
@@ -102,17 +103,17 @@ impl Stage {
 /// When there is no device, `start` cannot be opened or has no motion, or the film not be written.
 pub fn video(start: &Start, picture: &Picture, path: &Path) -> Result<usize, ViewError> {
     let Stage { egui, mut viewer, .. } = Stage::new(start, picture)?;
-    let none = || ViewError::Open("there is no motion to show: give the scene one, or take a picture".into());
+    let none = || Error::from("there is no motion to show: give the scene one, or take a picture");
     let (_, duration) = viewer.time_in_motion().ok_or_else(none)?;
-    let mut film = Film::begin(path.to_owned(), || ()).map_err(ViewError::Open)?;
+    let mut film = Film::begin(path.to_owned(), || ())?;
     let stills = (duration / PERIOD).round() as usize;
     for _ in 0..stills {
         viewer.advance(PERIOD, &egui);
         let size = picture.size.map(|side| side as u32);
         film.take(viewer.picture(size, &egui.style_of(egui.theme()).visuals)?);
     }
-    let written = film.end().wait().map_err(ViewError::Open)?;
-    written.map(|_| stills).map_err(ViewError::Frame)
+    film.end().wait()??;
+    Ok(stills)
 }
 
 /// Opens `start`, plays until the picture's instant, and writes the window as it is then to the PNG file `path`.
@@ -147,7 +148,8 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
 pub(super) fn write_picture(path: &Path, size: [u32; 2], bytes: &[u8]) -> Result<(), ViewError> {
     let written =
         replace_file(path, |file| encode_png(file, size, png::ColorType::Rgba, bytes).map_err(io::Error::other));
-    written.map_err(|error| ViewError::Write { path: path.to_owned(), reason: error.to_string() })
+    let remedy = "choose another folder or free some space";
+    written.map_err(|error| format!("cannot write {}: {error}; {remedy}", path.display()).into())
 }
 
 /// Paints a frame of egui and reads it back: size and bytes of red, green, blue, opacity.

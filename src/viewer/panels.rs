@@ -460,7 +460,7 @@ fn motions(ui: &mut Ui, guide: &mut Guide) {
 }
 
 fn progress(ui: &mut Ui, job: &Job, width: f32) {
-    let done = job.progress();
+    let done = job.progress;
     let share = if done.points > 0 { done.done as f32 / done.points as f32 } else { 0.0 };
     let text = if done.points == 0 {
         "preparing".to_owned()

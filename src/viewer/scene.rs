@@ -169,7 +169,7 @@ impl SceneView {
     ) -> Result<(), ViewError> {
         let (context, loaded) = (Arc::clone(&self.context), loaded.clone());
         let set_up = move |effects: &GraphicsEffects| Body::new(&context, &loaded, effects);
-        if let Some(body) = self.redrawing.follow(effects, "object", set_up, wake).map_err(ViewError::Open)? {
+        if let Some(body) = self.redrawing.follow(effects, "object", set_up, wake)? {
             self.body = body?;
         }
         Ok(())
@@ -317,11 +317,7 @@ impl SceneView {
         chain: &Chain,
     ) -> Result<egui::TextureId, GpuError> {
         let size = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
-        let extremes = self.body.as_ref().map_or([0.0; 2], |body| body.extremes);
-        let top = match self.shown.quantity {
-            Quantity::Displacement => extremes[0],
-            Quantity::Force => extremes[1],
-        };
+        let top = self.body.as_ref().map_or(0.0, |body| body.most(self.shown.quantity));
         let look = Look {
             background: figure_colour(palette.stage).channels(),
             quantity: self.shown.quantity,
@@ -382,7 +378,7 @@ impl SceneView {
             shapes.extend(bare.iter().map(|cone| Shape::from(cone).unlit()));
         }
         if let Some(body) = &self.body {
-            let (longest, colour) = (body.extremes[1].max(f64::MIN_POSITIVE), figure_colour(palette.force));
+            let (longest, colour) = (body.most(Quantity::Force).max(f64::MIN_POSITIVE), figure_colour(palette.force));
             for (node, force) in body.contacts() {
                 // The shapes' own places are those of the node at rest: the GPU moves them with it.
                 let rest = body.rest(node).as_dvec3();
