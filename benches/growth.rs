@@ -17,8 +17,8 @@ use haptize::{
     dataset::Grid,
     draw::{
         colour,
-        diagram::{Diagram, Series},
-        plot::{Entry, Mark},
+        diagram::Diagram,
+        plot::{Curve, Entry, Mark},
     },
     proxy::Chain,
     report::write_both,
@@ -177,17 +177,15 @@ fn costs(scene: &Scene, joints: usize, most: usize) -> [Vec<Cost>; 2] {
 
 /// Draws the costs of stores, those of uniform grids dashed beside them.
 fn draw(folder: &str, name: &str, [title, note]: [&str; 2], all: &[[Vec<Cost>; 2]]) {
-    let curves = |place: fn(&Cost) -> (f64, f64), dashed: bool| -> Vec<Series> {
+    let curves = |place: fn(&Cost) -> (f64, f64), dashed: bool| -> Vec<Curve> {
         let curve = |kind: usize, dashed: bool| {
-            all.iter().zip(1..).map(move |(costs, joints)| Series {
-                name: match (dashed, joints) {
+            all.iter().zip(1..).map(move |(costs, joints)| {
+                let name = match (dashed, joints) {
                     (true, _) => String::new(),
                     (false, 1) => "1 joint".to_owned(),
                     _ => joints.to_string(),
-                },
-                points: costs[kind].iter().map(place).collect(),
-                dashed,
-                colour: joints - 1,
+                };
+                Curve { dashed, ..Curve::new(name, joints - 1, costs[kind].iter().map(place)) }
             })
         };
         curve(0, false).chain(curve(1, true).filter(|_| dashed)).collect()

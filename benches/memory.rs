@@ -16,8 +16,8 @@ use haptize::{
     contact::{Slip, exact_dissipation},
     dataset::{Dataset, SlipColumns},
     draw::{
-        chart::{Curve, Lane, Stack},
-        colour,
+        chart::{Lane, Stack},
+        plot::Curve,
     },
     fixtures::{
         Random,
@@ -78,17 +78,13 @@ fn felt(data: &Dataset, seconds: f64, position: impl Fn(f64) -> [f64; 2]) -> Vec
     (0..(1e3 * seconds) as usize).map(tick).collect()
 }
 
-fn curve(name: impl Into<String>, number: usize, points: impl Iterator<Item = (f64, f64)>) -> Curve {
-    Curve { name: name.into(), colour: colour::series(number), dashed: false, points: points.collect() }
-}
-
 fn lane(title: &str, curves: Vec<Curve>) -> Lane {
-    Lane { title: title.into(), curves, height: 170.0, counts: false }
+    Lane { height: 170.0, ..Lane::new(title, curves) }
 }
 
 fn draw(folder: &Path, name: &str, [headline, across]: [&str; 2], lanes: Vec<Lane>) {
     let [headline, across] = [headline, across].map(str::to_owned);
-    let stack = Stack { headline, across, lanes, shaded: Vec::new(), shade_name: String::new() };
+    let stack = Stack { headline, across, lanes, contact: Vec::new() };
     println!("{}", write_png(folder, name, &stack.draw()).unwrap().display());
 }
 
@@ -105,8 +101,8 @@ fn presses(folder: &Path) {
         let depth = |t: f64| if t < 2.5 { (DEPTH / ramp * t).min(DEPTH) } else { DEPTH - 0.2 * (t - 2.5) };
         let ticks = felt(&data, 4.0, |t| [0.0, depth(t).max(-0.002)]);
         let name = format!("pressed in {ramp} s");
-        forces.push(curve(name.clone(), number, over_time(&ticks, |output| -output.sample.torque[1])));
-        dents.push(curve(name, number, over_time(&ticks, |output| 100.0 * output.dent.unwrap())));
+        forces.push(Curve::new(name.clone(), number, over_time(&ticks, |output| -output.sample.torque[1])));
+        dents.push(Curve::new(name, number, over_time(&ticks, |output| 100.0 * output.dent.unwrap())));
         let held = -ticks[2400].sample.torque[1];
         let most = ticks.iter().map(|output| -output.sample.torque[1]).fold(0.0, f64::max);
         println!("pressed in {ramp} s: {most:.2} N at most, {held:.2} N after 2.4 s");
@@ -126,7 +122,7 @@ fn scrapes(folder: &Path) {
         let rows = ticks.iter().skip(1000).map(|output| (place(output), -output.sample.torque[1]));
         let last = -ticks.last().unwrap().sample.torque[1];
         println!("scraped at {speed} dents/s: {last:.2} N after 8 dents");
-        curves.push(curve(format!("{speed} dents/s"), number, rows));
+        curves.push(Curve::new(format!("{speed} dents/s"), number, rows));
     }
     let texts = ["Pressed for a second, then scraped", "way over the width of a dent [1]"];
     draw(folder, "memory-scrape", texts, vec![lane("force [N]", curves)]);
@@ -141,8 +137,8 @@ fn stick_and_slip(folder: &Path) {
         [("static 0.6, kinetic 0.3", "static_coefficient = 0.6"), ("0.3 alone", "")].into_iter().enumerate()
     {
         let ticks = felt(&block(&friction(more)), 3.0, |t| [0.02 * (t - 0.5).max(0.0), (0.2 * t).min(0.02)]);
-        forces.push(curve(name, number, over_time(&ticks, |output| -output.torque[0])));
-        places.push(curve(name, number, over_time(&ticks, |output| 1e3 * output.proxy[0])));
+        forces.push(Curve::new(name, number, over_time(&ticks, |output| -output.torque[0])));
+        places.push(Curve::new(name, number, over_time(&ticks, |output| 1e3 * output.proxy[0])));
     }
     let lanes = vec![lane("force along [N]", forces), lane("finger [mm]", places)];
     draw(folder, "memory-stick-slip", ["Dragged along at 20 mm/s by a soft hand", "time [s]"], lanes);
@@ -186,7 +182,8 @@ fn loops(folder: &Path) {
         1e3 * rise,
         1e3 * own
     );
-    let curves = vec![curve("each torque relaxes (QLV)", 1, qlv), curve("the root of the energy relaxes", 0, ours)];
+    let curves =
+        vec![Curve::new("each torque relaxes (QLV)", 1, qlv), Curve::new("the root of the energy relaxes", 0, ours)];
     let texts = ["Round a bump, two loops a second", "time [s]"];
     draw(folder, "memory-loops", texts, vec![lane("energy given [J]", curves)]);
 }
@@ -217,7 +214,7 @@ fn several(folder: &Path) {
     }
     let names = ["median", "95 %", "most"];
     let curves = curves.into_iter().zip(names).enumerate();
-    let curves = curves.map(|(number, (points, name))| curve(name, number, points.into_iter())).collect();
+    let curves = curves.map(|(number, (points, name))| Curve::new(name, number, points.into_iter())).collect();
     let texts = ["Friction of all contacts together over that of each", "contacts with random forces"];
     draw(folder, "memory-several", texts, vec![lane("ratio [1]", curves)]);
 }

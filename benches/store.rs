@@ -16,7 +16,7 @@ use haptize::{
     JointVector, MAX_AXES,
     contact::Status,
     dataset::{Axis, Dataset, Grid, Provenance},
-    draw::diagram::{Diagram, Series},
+    draw::{diagram::Diagram, plot::Curve},
     field::TorqueField,
     fixtures::grids,
     proxy::Chain,
@@ -181,12 +181,9 @@ fn dense_grid(scene: &Scene, spacing: f64, interpolation: Interpolation, unseen:
 
 /// Draws error against nodes and bytes.
 fn draw(folder: &str, rows: &[(&str, Vec<Spent>)]) {
-    let curves = |across: fn(&Spent) -> f64| -> Vec<Series> {
-        let curve = |(colour, (name, spent)): (usize, &(&str, Vec<Spent>))| Series {
-            name: (*name).to_owned(),
-            points: spent.iter().map(|spent| (across(spent), spent.2)).collect(),
-            dashed: false,
-            colour,
+    let curves = |across: fn(&Spent) -> f64| -> Vec<Curve> {
+        let curve = |(number, (name, spent)): (usize, &(&str, Vec<Spent>))| {
+            Curve::new(*name, number, spent.iter().map(|spent| (across(spent), spent.2)))
         };
         rows.iter().enumerate().map(curve).collect()
     };

@@ -9,8 +9,8 @@ use haptize::{
     contact::{Model, Proximity, Solver, Status},
     dataset::{Axis, Grid},
     draw::{
-        chart::{Curve, Lane, Stack},
-        colour,
+        chart::{Lane, Stack},
+        plot::Curve,
     },
     object::Object,
     paper::PaperBackend,
@@ -295,15 +295,9 @@ fn draw(
         ("cost_points", "Cost against grid points", "Grid points [10^6]", "Contact-free point [us]", free),
     ];
     for (name, headline, across, title, points) in charts {
-        let curve = Curve { name: String::new(), colour: colour::series(0), dashed: false, points };
-        let lane = Lane { title: title.into(), curves: vec![curve], height: 220.0, counts: false };
-        let stack = Stack {
-            headline: headline.into(),
-            across: across.into(),
-            lanes: vec![lane],
-            shaded: Vec::new(),
-            shade_name: String::new(),
-        };
+        let lane = Lane { height: 220.0, ..Lane::new(title, vec![Curve::new("", 0, points)]) };
+        let (headline, across) = (headline.into(), across.into());
+        let stack = Stack { headline, across, lanes: vec![lane], contact: Vec::new() };
         let [svg, png] = write_both(&folder, name, &stack.draw())?;
         println!("{} {}", svg.display(), png.display());
     }

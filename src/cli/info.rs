@@ -141,8 +141,7 @@ pub fn inclusions(object: &ObjectSpec) -> Vec<String> {
 /// The skin `spec` on the dataset's surface.
 fn skin_on(dataset: &Dataset, spec: SkinSpec) -> Option<Skin> {
     let surface = dataset.surface.as_ref()?;
-    let nodes: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
-    let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    let (nodes, triangles): (Vec<DVec3>, _) = (surface.places().collect(), surface.facets());
     Some(Skin::new(spec, &nodes, &triangles))
 }
 

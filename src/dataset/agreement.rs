@@ -56,7 +56,7 @@ impl Dataset {
 }
 
 fn check_sphere(surface: &Surface, centre: DVec3, radius: f64) -> Result<(), String> {
-    let distances = surface.nodes.chunks_exact(3).map(|node| DVec3::from_slice(node).distance(centre));
+    let distances = surface.places().map(|place| place.distance(centre));
     let rounding = OFF_SPHERE * (radius + centre.length());
     match distances.enumerate().find(|(_, distance)| (distance - radius).abs() > rounding) {
         None => Ok(()),

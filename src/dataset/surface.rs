@@ -26,15 +26,26 @@ impl Surface {
         }
     }
 
+    /// Returns where its nodes are at rest (m).
+    pub fn places(&self) -> impl Iterator<Item = DVec3> {
+        self.nodes.chunks_exact(3).map(DVec3::from_slice)
+    }
+
+    /// Returns the nodes of each of its triangles.
+    #[must_use]
+    pub fn facets(&self) -> &[[u32; 3]] {
+        self.triangles.as_chunks().0
+    }
+
     /// Builds the object that was baked; `spec` is that of the dataset's scene. No file is read.
     ///
     /// # Errors
     /// As for [`Object::from_body`].
     pub fn object(&self, spec: &ObjectSpec) -> Result<Object, Error> {
         let mut body = Body {
-            nodes: self.nodes.chunks_exact(3).map(DVec3::from_slice).collect(),
+            nodes: self.places().collect(),
             surface_nodes: self.nodes.len() / 3,
-            triangles: self.triangles.as_chunks().0.to_vec(),
+            triangles: self.facets().to_vec(),
             ..Body::default()
         };
         if let Some(Solid { inner_nodes, tetrahedra, mid_nodes, regions }) = &self.solid {

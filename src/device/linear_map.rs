@@ -70,39 +70,36 @@ impl LinearMap {
     /// Returns `A m + b` of a measured position.
     #[must_use]
     pub fn position(&self, measured: &JointVector) -> JointVector {
-        let mut position = self.offset;
-        for (i, position) in position.iter_mut().enumerate() {
-            *position += (0..self.count).map(|j| self.matrix[i][j] * measured[j]).sum::<f64>();
-        }
+        let mut position = self.product(|i, j| self.matrix[i][j], measured);
+        position.iter_mut().zip(self.offset.iter()).for_each(|(position, offset)| *position += offset);
         position
     }
 
     /// Returns `A^-1 (q - b)`, what the device measures at the position `q`.
     #[must_use]
     pub fn measured(&self, position: &JointVector) -> JointVector {
-        let mut measured = JointVector::zeros(self.count);
-        for (i, measured) in measured.iter_mut().enumerate() {
-            *measured = (0..self.count).map(|j| self.inverse[i][j] * (position[j] - self.offset[j])).sum();
-        }
-        measured
+        let mut moved = *position;
+        moved.iter_mut().zip(self.offset.iter()).for_each(|(moved, offset)| *moved -= offset);
+        self.product(|i, j| self.inverse[i][j], &moved)
     }
 
     /// Returns `A^T tau`, the device's efforts for the scene's.
     #[must_use]
     pub fn effort(&self, torque: &JointVector) -> JointVector {
-        self.transposed(&self.matrix, torque)
+        self.product(|i, j| self.matrix[j][i], torque)
     }
 
     /// Returns `A^-T tau_m`, the scene's efforts for the device's.
     #[must_use]
     pub fn torque(&self, effort: &JointVector) -> JointVector {
-        self.transposed(&self.inverse, effort)
+        self.product(|i, j| self.inverse[j][i], effort)
     }
 
-    fn transposed(&self, matrix: &[[f64; MAX_JOINTS]; MAX_JOINTS], vector: &JointVector) -> JointVector {
+    /// The product of the matrix with these entries and `vector`.
+    fn product(&self, entry: impl Fn(usize, usize) -> f64, vector: &JointVector) -> JointVector {
         let mut product = JointVector::zeros(self.count);
-        for (j, product) in product.iter_mut().enumerate() {
-            *product = (0..self.count).map(|i| matrix[i][j] * vector[i]).sum();
+        for (i, product) in product.iter_mut().enumerate() {
+            *product = (0..self.count).map(|j| entry(i, j) * vector[j]).sum();
         }
         product
     }

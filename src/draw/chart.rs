@@ -2,8 +2,8 @@
 
 use super::{
     canvas::{Area, Canvas},
-    colour::{self, Colour},
-    plot::{self, Entry, Mark, Panel, Scale},
+    colour,
+    plot::{self, Curve, Entry, Mark, Panel, Scale},
     ticks,
 };
 
@@ -11,27 +11,12 @@ use super::{
 const WIDTH: f64 = 760.0;
 /// Margin of every sheet.
 pub(crate) const MARGIN: f64 = 24.0;
-/// Left end of headlines.
-pub(crate) const TITLE_LEFT: f64 = MARGIN;
 /// Room for the tick labels left of a panel.
 const LEFT: f64 = 40.0;
 /// Room for the title and legend above a panel.
 const ABOVE: f64 = 40.0;
 /// Room for the tick labels and the title below the lowest panel.
 const BELOW: f64 = 52.0;
-
-/// A curve of a panel.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// In the legend; curves without a name are not listed.
-    pub name: String,
-    /// Its colour.
-    pub colour: Colour,
-    /// Whether it is dashed.
-    pub dashed: bool,
-    /// Data points; those that are no numbers interrupt the curve.
-    pub points: Vec<(f64, f64)>,
-}
 
 /// One panel of a stack.
 #[derive(Clone, Debug)]
@@ -55,10 +40,8 @@ pub struct Stack {
     pub across: String,
     /// From the top.
     pub lanes: Vec<Lane>,
-    /// Intervals of the horizontal axis shaded in all panels.
-    pub shaded: Vec<[f64; 2]>,
-    /// Meaning of the shade.
-    pub shade_name: String,
+    /// Intervals of the horizontal axis in contact, shaded in all panels.
+    pub contact: Vec<[f64; 2]>,
 }
 
 impl Stack {
@@ -69,8 +52,8 @@ impl Stack {
         let height: f64 = self.lanes.iter().map(|lane| lane.height + ABOVE).sum();
         let mut canvas = Canvas::new(WIDTH, top + height + BELOW + MARGIN / 2.0);
         headline(&mut canvas, &self.headline);
-        if !self.shaded.is_empty() {
-            let shade = Entry { name: self.shade_name.clone(), colour: SHADE, mark: Mark::Box };
+        if !self.contact.is_empty() {
+            let shade = Entry { name: "in contact".into(), colour: colour::SHADE, mark: Mark::Box };
             plot::legend(&mut canvas, (WIDTH - MARGIN, MARGIN + 12.0), &[shade]);
         }
         let times =
@@ -79,20 +62,18 @@ impl Stack {
         let mut y = top;
         for (number, lane) in self.lanes.iter().enumerate() {
             let area = Area { x: MARGIN + LEFT, y: y + ABOVE, width: WIDTH - 2.0 * MARGIN - LEFT, height: lane.height };
-            lane.draw(&mut canvas, area, &across, &self.shaded, number + 1 == self.lanes.len());
+            lane.draw(&mut canvas, area, &across, &self.contact, number + 1 == self.lanes.len());
             y = area.bottom();
         }
         canvas
     }
 }
 
-/// Shade of intervals: darker than the grid's white, lighter than its lines.
-const SHADE: Colour = colour::SHADE;
-
 impl Lane {
-    /// A panel without curves.
-    pub(crate) fn empty(title: &str) -> Self {
-        Self { title: title.to_owned(), curves: Vec::new(), height: 130.0, counts: false }
+    /// A panel of `curves`, as high as most.
+    #[must_use]
+    pub fn new(title: impl Into<String>, curves: Vec<Curve>) -> Self {
+        Self { title: title.into(), curves, height: 130.0, counts: false }
     }
 
     fn draw(&self, canvas: &mut Canvas, area: Area, across: &Scale, shaded: &[[f64; 2]], lowest: bool) {
@@ -106,7 +87,7 @@ impl Lane {
             if self.counts { Scale::whole([low, high], &self.title) } else { Scale::linear([low, high], &self.title) };
         let panel = Panel { area, across: across.clone(), up };
         for &interval in shaded {
-            panel.shade(canvas, interval, SHADE);
+            panel.shade(canvas, interval, colour::SHADE);
         }
         panel.grid(canvas, lowest);
         panel.zero_line(canvas);
@@ -117,14 +98,7 @@ impl Lane {
         if !values().any(f64::is_finite) {
             panel.note(canvas, "no data");
         }
-        let mark = |curve: &Curve| if curve.dashed { Mark::Dashes } else { Mark::Line };
-        let entries: Vec<Entry> = self
-            .curves
-            .iter()
-            .filter(|curve| !curve.name.is_empty())
-            .map(|curve| Entry { name: curve.name.clone(), colour: curve.colour, mark: mark(curve) })
-            .collect();
-        panel.legend(canvas, &entries);
+        panel.legend(canvas, &plot::entries(&self.curves).collect::<Vec<_>>());
     }
 }
 
@@ -185,10 +159,8 @@ impl Histogram {
         // The texts stand above the panel in the order of the lines: beside them they would run into each other.
         let texts: Vec<&str> = shown.iter().map(|(_, text)| text.as_str()).collect();
         if !texts.is_empty() {
-            panel.legend(
-                &mut canvas,
-                &[Entry { name: texts.join("  ·  "), colour: colour::series(1), mark: Mark::Dashes }],
-            );
+            let entry = Entry { name: texts.join("  ·  "), colour: colour::series(1), mark: Mark::Dashes };
+            panel.legend(&mut canvas, &[entry]);
         }
         canvas
     }
@@ -196,5 +168,5 @@ impl Histogram {
 
 /// The figure's title, top left.
 pub(crate) fn headline(canvas: &mut Canvas, text: &str) {
-    canvas.text((TITLE_LEFT, MARGIN + 12.0), text, plot::HEADLINE);
+    canvas.text((MARGIN, MARGIN + 12.0), text, plot::HEADLINE);
 }

@@ -4,7 +4,7 @@ use super::{
     canvas::{Area, Canvas},
     chart::{MARGIN, headline},
     colour,
-    plot::{Entry, Mark, NOTE, Panel, Scale},
+    plot::{self, Curve, Entry, NOTE, Panel, Scale},
 };
 
 /// Width of a sheet with two panels side by side, in points.
@@ -21,19 +21,6 @@ const TITLES: f64 = 28.0;
 const LEFT: f64 = 56.0;
 /// Room between two panels.
 const BETWEEN: f64 = 40.0;
-
-/// One curve of a diagram.
-#[derive(Clone, Debug)]
-pub struct Series {
-    /// In the legend; curves without a name are not listed.
-    pub name: String,
-    /// Positive numbers; others interrupt the curve.
-    pub points: Vec<(f64, f64)>,
-    /// Whether it is dashed, without dots.
-    pub dashed: bool,
-    /// Number of its colour.
-    pub colour: usize,
-}
 
 /// Panels in rows of two.
 pub struct Diagram {
@@ -55,7 +42,7 @@ fn around(values: impl Iterator<Item = f64>) -> [f64; 2] {
 
 /// Widths of a curve and its marks: the first are the widest, so that a curve that coincides with a later one shows
 /// around it. A single mark is as large as any other.
-fn nested(curve: &Series, number: usize, count: usize) -> (f64, f64) {
+fn nested(curve: &Curve, number: usize, count: usize) -> (f64, f64) {
     let around = if curve.points.len() > 1 { count.saturating_sub(number + 1).min(2) as f64 } else { 0.5 };
     (1.9 + 1.5 * around, 3.6 + 1.3 * around)
 }
@@ -70,8 +57,9 @@ impl Diagram {
         Self { canvas }
     }
 
-    /// Draws panel `number`, counted row by row from the left, with the points of `front` marked.
-    pub fn panel(&mut self, number: usize, across: &str, up: &str, curves: &[Series], front: &[(f64, f64)]) {
+    /// Draws panel `number`, counted row by row from the left, with the points of `front` marked. What is not positive
+    /// interrupts a curve; dashed ones have no dots.
+    pub fn panel(&mut self, number: usize, across: &str, up: &str, curves: &[Curve], front: &[(f64, f64)]) {
         let canvas = &mut self.canvas;
         let width = (WIDTH - 2.0 * MARGIN - BETWEEN) / 2.0;
         let x = MARGIN + (number % 2) as f64 * (width + BETWEEN) + LEFT;
@@ -88,7 +76,7 @@ impl Diagram {
         }
         let solid = curves.iter().filter(|curve| !curve.dashed && curve.points.len() > 1).count();
         for (number, curve) in curves.iter().enumerate() {
-            let ink = colour::series(curve.colour);
+            let ink = curve.colour;
             let (width, radius) = nested(curve, number % solid.max(1), solid);
             let shown: Vec<(f64, f64)> = curve
                 .points
@@ -109,17 +97,9 @@ impl Diagram {
     }
 
     /// Draws the legend of `curves`, and of `more` after them.
-    pub fn legend(&mut self, curves: &[Series], more: Vec<Entry>) {
-        let mark = |curve: &Series| if curve.dashed { Mark::Dashes } else { Mark::Line };
-        let own = curves.iter().filter(|curve| !curve.name.is_empty()).map(|curve| Entry {
-            name: curve.name.clone(),
-            colour: colour::series(curve.colour),
-            mark: mark(curve),
-        });
-        let entries: Vec<Entry> = own.chain(more).collect();
-        let area = Area { x: MARGIN, y: 74.0, width: WIDTH - 2.0 * MARGIN, height: 0.0 };
-        Panel { area, across: Scale::linear([0.0, 1.0], ""), up: Scale::linear([0.0, 1.0], "") }
-            .legend(&mut self.canvas, &entries);
+    pub fn legend(&mut self, curves: &[Curve], more: Vec<Entry>) {
+        let entries: Vec<Entry> = plot::entries(curves).chain(more).collect();
+        plot::legend(&mut self.canvas, (WIDTH - MARGIN, 63.0), &entries);
     }
 
     /// The sheet.

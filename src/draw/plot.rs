@@ -102,6 +102,28 @@ pub struct Panel {
     pub up: Scale,
 }
 
+/// A curve of a panel.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// In the legend; curves without a name are not listed.
+    pub name: String,
+    /// Its colour.
+    pub colour: Colour,
+    /// Whether it is dashed.
+    pub dashed: bool,
+    /// Data points; those that are no numbers interrupt the curve.
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    /// A solid curve through `points`, in the colour of series `number`.
+    #[must_use]
+    pub fn new(name: impl Into<String>, number: usize, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let (colour, points) = (colour::series(number), points.into_iter().collect());
+        Self { name: name.into(), colour, dashed: false, points }
+    }
+}
+
 /// A mark in a legend.
 #[derive(Clone, Debug)]
 pub struct Entry {
@@ -216,6 +238,15 @@ impl Panel {
     pub fn legend(&self, canvas: &mut Canvas, entries: &[Entry]) {
         legend(canvas, (self.area.right(), self.area.y - TITLE_LIFT), entries);
     }
+}
+
+/// Entries of those of `curves` that have a name.
+pub(super) fn entries(curves: &[Curve]) -> impl Iterator<Item = Entry> {
+    curves.iter().filter(|curve| !curve.name.is_empty()).map(|Curve { name, colour, dashed, .. }| Entry {
+        name: name.clone(),
+        colour: *colour,
+        mark: if *dashed { Mark::Dashes } else { Mark::Line },
+    })
 }
 
 /// A legend on one line that ends at `right`, a point of its base line.

@@ -212,7 +212,7 @@ impl Beyond {
 
 impl Surroundings {
     fn new(dataset: &Dataset, chain: &Chain) -> Option<Self> {
-        let nodes = dataset.surface.as_ref()?.nodes.chunks_exact(3).map(DVec3::from_slice);
+        let nodes = dataset.surface.as_ref()?.places();
         let [least, greatest] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         let corners = nodes.fold([least, greatest], |[least, greatest], node| [least.min(node), greatest.max(node)]);
         Some(Self { chain: chain.clone(), corners })

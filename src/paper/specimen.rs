@@ -12,7 +12,7 @@ use crate::{
         chart,
         colour::{self, Colour, ColourMap},
         plot,
-        raster::{Finish, Raster, Vertex, Viewpoint},
+        raster::{Raster, Vertex, Viewpoint},
         ticks,
     },
     report::{PIXELS, object::draw_proxy},
@@ -143,7 +143,7 @@ fn draw_block(raster: &mut Raster, block: &SpecimenSpec) {
             normal[axis] = if side == 1 { 1.0 } else { -1.0 };
             let vertex = |position: DVec3| Vertex { position, normal, colour: SPONGE };
             for triangle in [[face[0], face[1], face[2]], [face[0], face[2], face[3]]] {
-                raster.triangle(triangle.map(vertex), Finish::Solid);
+                raster.triangle(triangle.map(vertex));
             }
             for edge in 0..4 {
                 raster.line([face[edge], face[(edge + 1) % 4]], 1.4, colour::SOFT_INK, 0.0);

@@ -73,7 +73,7 @@ pub struct Accounts {
 
 /// Loads on the proxy during a step beside coupling, contact torque and stops; zero if the scene names no such
 /// effect.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Extra {
     /// Torque of the four-channel coupling's channels (N m).
     pub channels: JointVector,

@@ -48,7 +48,8 @@ pub struct DrawnForces {
     /// Of contact, at each node (N).
     contact: Vec<DVec3>,
     smoothing: Option<Smoothing>,
-    memory: Option<ObjectMemory>,
+    /// Where the object relaxes, with the sum of its past and of contact (N).
+    memory: Option<(ObjectMemory, Vec<DVec3>)>,
 }
 
 impl DrawnForces {
@@ -60,14 +61,14 @@ impl DrawnForces {
         Self {
             contact: vec![DVec3::ZERO; nodes],
             smoothing: spec.effects.smoothing.map(|time| Smoothing::new(time, period, nodes)),
-            memory: relaxation.map(|relaxation| ObjectMemory::new(relaxation, period, nodes)),
+            memory: relaxation.map(|spec| (ObjectMemory::new(spec, period, nodes), vec![DVec3::ZERO; nodes])),
         }
     }
 
     /// Takes the forces of `contact` as they were `latest`.
     pub fn touch(&mut self, contact: &ContactForces, latest: &Latest) {
         contact.at(&latest.proxy, latest.share, &mut self.contact);
-        if let (Some(memory), None) = (&mut self.memory, latest.dent) {
+        if let (Some((memory, _)), None) = (&mut self.memory, latest.dent) {
             memory.clear();
         }
     }
@@ -78,14 +79,18 @@ impl DrawnForces {
         &self.contact
     }
 
-    /// Lets a frame go by; returns the forces of contact in it, smoothed, and the body force of the object's past,
-    /// which is empty where it has none (N).
-    pub fn frame(&mut self) -> [&[DVec3]; 2] {
+    /// Lets a frame go by; returns the forces in it: those of contact, smoothed, and the body force of the object's past
+    /// (N).
+    pub fn frame(&mut self) -> &[DVec3] {
         let contact = match &mut self.smoothing {
             Some(smoothing) => smoothing.toward(&self.contact),
             None => &self.contact,
         };
-        [contact, self.memory.as_mut().map_or(&[], |memory| memory.frame(contact))]
+        let Some((memory, sum)) = &mut self.memory else { return contact };
+        for ((sum, contact), past) in sum.iter_mut().zip(contact).zip(memory.frame(contact)) {
+            *sum = *contact + *past;
+        }
+        sum
     }
 }
 
@@ -94,8 +99,6 @@ pub struct Graphics<'object> {
     contact: ContactForces,
     motion: ObjectMotion<'object>,
     forces: DrawnForces,
-    /// Their sum (N).
-    sum: Vec<DVec3>,
 }
 
 impl<'object> Graphics<'object> {
@@ -110,22 +113,18 @@ impl<'object> Graphics<'object> {
         spec: &GraphicsSpec,
         relaxation: Option<&RelaxationSpec>,
     ) -> Result<Self, Error> {
-        let nodes = object.rest.len();
         let motion = ObjectMotion::new(object, 1.0 / spec.rate, &spec.effects)?;
-        Ok(Self { contact, motion, forces: DrawnForces::new(nodes, spec, relaxation), sum: vec![DVec3::ZERO; nodes] })
+        Ok(Self { contact, motion, forces: DrawnForces::new(object.rest.len(), spec, relaxation) })
     }
 
     /// One frame with the contact that was `latest`. An object without dynamics is moved only where the frame
     /// `is_seen`: what follows does not depend on where it is.
     pub fn frame(&mut self, latest: &Latest, is_seen: bool) {
         self.forces.touch(&self.contact, latest);
-        let [contact, past] = self.forces.frame();
-        if !is_seen && !self.motion.has_dynamics() {
-            return;
+        let forces = self.forces.frame();
+        if is_seen || self.motion.has_dynamics() {
+            self.motion.step(forces);
         }
-        self.sum.copy_from_slice(contact);
-        self.sum.iter_mut().zip(past).for_each(|(sum, past)| *sum += *past);
-        self.motion.step(&self.sum);
     }
 
     /// The object as it is now.

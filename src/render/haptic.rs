@@ -340,13 +340,7 @@ impl Haptics {
         let limits = self.npmi.limits();
         let stops = self.range.stops(&state.motion.position, &state.motion.velocity, interval, limits);
         let mut load = self.coupling.proxy_load(&state.device, velocity, &sample.torque, stops);
-        let mut extra = Extra {
-            channels: JointVector::zeros(self.joints()),
-            friction_work: 0.0,
-            presliding: 0.0,
-            drag: 0.0,
-            control_dissipation: 0.0,
-        };
+        let mut extra = Extra { channels: JointVector::zeros(self.joints()), ..Extra::default() };
         // After a fault nothing is known of the hand any more: its channel falls silent.
         if let (Some(channels), Some(memory), None) = (&self.channels, &state.channels, state.fault) {
             extra.channels = channels.proxy_torque(memory, &stage);

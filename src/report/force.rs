@@ -7,11 +7,7 @@
 use super::press;
 use crate::{
     JointVector,
-    draw::{
-        canvas::Canvas,
-        chart::{Curve, Lane, Stack},
-        colour,
-    },
+    draw::{canvas::Canvas, chart::Lane, plot::Curve},
     proxy::Chain,
     render::trace::{Tick, Trace},
 };
@@ -104,48 +100,27 @@ impl EndForce {
 #[must_use]
 pub fn force(felt: &[EndForce], trace: &Trace) -> Canvas {
     const AXES: [&str; 3] = ["x", "y", "z"];
-    let curve = |number: usize, name: String, points: Vec<(f64, f64)>| Curve {
-        name,
-        colour: colour::series(number),
-        dashed: false,
-        points,
+    let curve = |number: usize, name: String, force: &EndForce, axis: usize| {
+        Curve::new(name, number, force.forces.iter().map(|(time, force)| (*time, force[axis])))
     };
-    let lane = |title: String, curves: Vec<Curve>, height: f64| Lane { title, curves, height, counts: false };
-    let along = |force: &EndForce, axis: usize| force.forces.iter().map(|(time, force)| (*time, force[axis])).collect();
+    let lane = |title: String, curves: Vec<Curve>, height: f64| Lane { height, ..Lane::new(title, curves) };
     let mut lanes: Vec<Lane> = match felt {
         [single] => {
-            let curves = (0..3).map(|axis| curve(axis, format!("along {}", AXES[axis]), along(single, axis)));
+            let curves = (0..3).map(|axis| curve(axis, format!("along {}", AXES[axis]), single, axis));
             vec![lane("Contact force at the end of the proxy [N]".to_owned(), curves.collect(), 150.0)]
         }
         _ => (0..3)
             .rev()
             .map(|axis| {
-                let curves = felt.iter().enumerate().map(|(k, force)| curve(k, force.name.clone(), along(force, axis)));
+                let curves = felt.iter().enumerate().map(|(k, force)| curve(k, force.name.clone(), force, axis));
                 let title = format!("Contact force at the end of the proxy along {} [N]", AXES[axis]);
                 lane(title, curves.collect(), if axis == 2 { 150.0 } else { 90.0 })
             })
             .collect(),
     };
-    for unit in ["rad", "m"] {
-        let joints = trace.joints.iter().enumerate().filter(|(_, joint)| joint.unit == unit);
-        let curves: Vec<Curve> = joints
-            .map(|(number, label)| {
-                let points = trace.ticks.iter().map(|tick| (tick.time, tick.proxy[number])).collect();
-                curve(number, format!("q{} {}", press::subscript(number + 1), label.name), points)
-            })
-            .collect();
-        if !curves.is_empty() {
-            lanes.push(lane(format!("Proxy configuration [{unit}]"), curves, 130.0));
-        }
-    }
-    Stack {
-        headline: "Force felt at the end of the proxy".to_owned(),
-        across: "Time [s]".to_owned(),
-        lanes,
-        shaded: press::contact_intervals(&trace.ticks),
-        shade_name: "in contact".to_owned(),
-    }
-    .draw()
+    lanes
+        .extend(press::per_joint(trace, ["Proxy configuration"; 2], "q", |tick, joint| tick.proxy.get(joint).copied()));
+    press::stack("Force felt at the end of the proxy", trace, lanes)
 }
 
 #[cfg(test)]

@@ -57,7 +57,7 @@ pub fn gridized(samples: &Samples, dataset: &Dataset) -> Canvas {
     let map = ColourMap::Sequential { low: 0.0, high: if greatest > 0.0 { greatest } else { 1.0 } };
     let mut canvas = Canvas::new(WIDTH, HEIGHT);
     chart::headline(&mut canvas, "Torque in C-space before and after uniform gridization");
-    canvas.text((chart::TITLE_LEFT, chart::MARGIN + 32.0), &caption(samples, dataset, &fixed, shown), plot::NOTE);
+    canvas.text((chart::MARGIN, chart::MARGIN + 32.0), &caption(samples, dataset, &fixed, shown), plot::NOTE);
     let range = |axis: usize| {
         let both = before.iter().chain(&after).map(move |spot| spot.0[axis]);
         ticks::snapped(ticks::range(both, 0.04))

@@ -8,7 +8,7 @@
 //! For the eye, `/tf` and `/robot_description` move the arm, `/object` is its surface and `/contact` the forces on the
 //! arm, of each frame.
 
-use super::object::{FORCE, Instant, instants_at};
+use super::object::{Extent, FORCE, Instant, instants_at};
 use crate::{
     Error, JointVector,
     dataset::Dataset,
@@ -21,7 +21,6 @@ use crate::{
     robot::description,
     ros::{Form, HAND_TOPIC, JointState, Marker, Markers, MessageWriter, RobotDescription, Transforms, WORLD},
 };
-use glam::DVec3;
 use std::{
     collections::BTreeMap,
     io::{self, Write},
@@ -38,8 +37,7 @@ const POSE_PERIOD: u64 = 20_000_000;
 /// fewer instants than its forces.
 const MOST_TRIANGLES: usize = 100_000;
 
-/// Length of the longest arrow over the object's radius (1), as in figures, and the diameter of arrows over it (1).
-const ARROW: f64 = 0.7;
+/// Diameter of arrows over the object's radius (1).
 const SHAFT: f64 = 0.04;
 
 /// What a session was.
@@ -58,10 +56,7 @@ pub struct McapSession<'a> {
 pub struct MovingObject {
     triangles: Vec<[u32; 3]>,
     instants: Vec<Instant>,
-    /// Half the diagonal of the object (m).
-    radius: f64,
-    /// The greatest force at a node (N).
-    greatest: f64,
+    extent: Extent,
 }
 
 impl McapSession<'_> {
@@ -73,15 +68,8 @@ impl McapSession<'_> {
         let Self { dataset, chain, trace, live } = *self;
         let Some(surface) = dataset.surface.as_ref().filter(|_| !trace.frames.is_empty()) else { return Ok(None) };
         let instants = instants_at(dataset, chain, trace, trace.frames.iter(), live.cloned())?;
-        let nodes = || surface.nodes.chunks_exact(3).map(DVec3::from_slice);
-        let (low, high) = (nodes().reduce(DVec3::min), nodes().reduce(DVec3::max));
-        let forces = instants.iter().flat_map(|instant| &instant.forces).map(|at| at.force.length());
-        Ok(Some(MovingObject {
-            triangles: surface.triangles.as_chunks().0.to_vec(),
-            radius: low.zip(high).map_or(0.0, |(low, high)| low.distance(high) / 2.0),
-            greatest: forces.filter(|force| force.is_finite()).fold(0.0, f64::max),
-            instants,
-        }))
+        let extent = Extent::of(&surface.places().collect::<Vec<_>>(), &instants);
+        Ok(Some(MovingObject { triangles: surface.facets().to_vec(), extent, instants }))
     }
 
     /// Writes the session, whose `object` this is, to `out`; `facts` about it go into the file's metadata.
@@ -199,10 +187,9 @@ impl MovingObject {
     /// Forces on the arm, from the nodes that push; those of the instant before go.
     fn forces(&self, instant: &Instant) -> Vec<Marker> {
         let marker = |form| Marker { namespace: "contact", colour: Colour::channels(FORCE), form };
-        let scale = ARROW * self.radius / self.greatest.max(f64::MIN_POSITIVE);
         let arrows = instant.forces.iter().filter_map(|at| {
             let tail = *instant.nodes.get(at.node as usize)?;
-            Some(marker(Form::Arrow([tail, tail - scale * at.force], SHAFT * self.radius)))
+            Some(marker(Form::Arrow([tail, tail + self.extent.arrow(at.force)], SHAFT * self.extent.radius)))
         });
         [marker(Form::None)].into_iter().chain(arrows).collect()
     }

@@ -17,6 +17,7 @@ use crate::{
     },
     error,
     names::counted,
+    object::corners,
     proxy::{Chain, Pose, Triangles, shape_frame, shape_triangles},
     render::{
         graphics::ContactForces,
@@ -153,15 +154,14 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
         .surface
         .as_ref()
         .ok_or_else(|| refused("the dataset has no surface (it was scanned); there is nothing to draw".to_owned()))?;
-    let rest: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
-    let triangles: Vec<[u32; 3]> = surface.triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    let rest: Vec<DVec3> = surface.places().collect();
     if let Some(instant) = instants.iter().find(|instant| instant.nodes.len() < rest.len()) {
         return Err(too_few_nodes(instant.time, instant.nodes.len(), rest.len()));
     }
     if instants.is_empty() {
         return Err(refused("the recording has no frames; give the scene a [graphics] table".to_owned()));
     }
-    let mut scene = Scene::new(chain, &rest, &triangles, instants);
+    let mut scene = Scene::new(chain, &rest, surface.facets(), instants);
     scene.links = links(&dataset.scene);
     let rows = instants.len().div_ceil(COLUMNS);
     let top = chart::MARGIN + 52.0;
@@ -170,7 +170,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     let mut entries = vec![
         Entry { name: "proxy node".to_owned(), colour: PROXY_NODE, mark: Mark::Dot },
         Entry {
-            name: format!("force on the arm, longest {} N", ticks::number(scene.greatest_force, 2)),
+            name: format!("force on the arm, longest {} N", ticks::number(scene.extent.force, 2)),
             colour: FORCE,
             mark: Mark::Line,
         },
@@ -211,58 +211,73 @@ struct Scene<'a> {
     triangles: &'a [[u32; 3]],
     view: Viewpoint,
     map: ColourMap,
-    /// Half the diagonal of the object at rest (m).
-    radius: f64,
-    /// Longest arrow's force (N).
-    greatest_force: f64,
+    extent: Extent,
+}
+
+/// How large the object and what happens to it are, over some instants.
+#[derive(Clone, Copy)]
+pub(super) struct Extent {
+    /// Middle of the object at rest, and half its diagonal (m).
+    pub(super) middle: DVec3,
+    pub(super) radius: f64,
+    /// Greatest displacement of a node (m), and greatest force at one (N).
+    pub(super) displacement: f64,
+    pub(super) force: f64,
+}
+
+impl Extent {
+    /// That of an object with nodes `rest` at rest (m), at `instants`.
+    pub(super) fn of(rest: &[DVec3], instants: &[Instant]) -> Self {
+        let [low, high] = corners(rest);
+        let moved = instants.iter().flat_map(|instant| rest.iter().zip(&instant.nodes)).map(|(n0, n)| n.distance(*n0));
+        let forces = instants.iter().flat_map(|instant| &instant.forces).map(|at| at.force.length());
+        let greatest = |sizes: &mut dyn Iterator<Item = f64>| sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
+        Self {
+            middle: (low + high) / 2.0,
+            radius: (high - low).length() / 2.0,
+            displacement: greatest(&mut moved.into_iter()),
+            force: greatest(&mut forces.into_iter()),
+        }
+    }
+
+    /// From tail to tip of the arrow of `force` on the object, as it is felt by the arm and as the window draws it: away
+    /// from the node that pushes. That of the greatest force is a little shorter than the object's radius.
+    pub(super) fn arrow(&self, force: DVec3) -> DVec3 {
+        -(0.7 * self.radius / self.force.max(f64::MIN_POSITIVE)) * force
+    }
 }
 
 impl<'a> Scene<'a> {
     fn new(chain: &'a Chain, rest: &'a [DVec3], triangles: &'a [[u32; 3]], instants: &[Instant]) -> Self {
-        let (low, high) =
-            rest.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &n| (low.min(n), high.max(n)));
-        let radius = ((high - low).length() / 2.0).max(f64::MIN_POSITIVE);
-        let displacements =
-            instants.iter().flat_map(|instant| rest.iter().zip(&instant.nodes)).map(|(n0, n)| (*n - *n0).length());
-        let greatest = displacements.filter(|u| u.is_finite()).fold(0.0, f64::max);
-        let forces = || instants.iter().flat_map(|instant| &instant.forces).map(|force| force.force);
-        let greatest_force = forces().map(|force| force.length()).filter(|force| force.is_finite()).fold(0.0, f64::max);
+        let extent = Extent::of(rest, instants);
+        let high = if extent.displacement > 0.0 { 1e3 * extent.displacement } else { 1.0 };
         let mut scene = Self {
             chain,
             links: Vec::new(),
             rest,
             triangles,
             view: Viewpoint::framing(&[], DVec3::NEG_Y, [1, 1]),
-            map: ColourMap::Pale { low: 0.0, high: if greatest > 0.0 { 1e3 * greatest } else { 1.0 } },
-            radius,
-            greatest_force,
+            map: ColourMap::Pale { low: 0.0, high },
+            extent,
         };
         let mut framed: Vec<DVec3> =
             instants.iter().flat_map(|instant| instant.nodes.iter().take(rest.len())).copied().collect();
-        let centre = (low + high) / 2.0;
         for instant in instants {
             // Proxy nodes at the object, not the whole arm.
-            framed.extend(instant.pose.nodes.iter().filter(|x| x.distance(centre) < 1.3 * radius));
+            framed.extend(instant.pose.nodes.iter().filter(|x| x.distance(extent.middle) < 1.3 * extent.radius));
             framed.extend(scene.arrows(instant).into_iter().map(|(_, tip)| tip));
         }
-        let direction = view(centre, instants, forces().sum());
-        scene.view = Viewpoint::framing(&framed, direction, CELL.map(|side| (side * PIXELS) as usize));
+        scene.view =
+            Viewpoint::framing(&framed, view(extent.middle, instants), CELL.map(|side| (side * PIXELS) as usize));
         scene
     }
 
-    /// Returns tail and tip of the arrow of each force on the arm, as it is felt and as the window draws it: away from
-    /// the node that pushes.
+    /// Returns tail and tip of the arrow of each force on the arm.
     fn arrows(&self, instant: &Instant) -> Vec<(DVec3, DVec3)> {
-        // The greatest force is a little shorter than the object's radius; those under a fiftieth of it would be
-        // specks.
-        let scale = 0.7 * self.radius / self.greatest_force.max(f64::MIN_POSITIVE);
-        let visible = instant.forces.iter().filter(|force| force.force.length() > 0.02 * self.greatest_force);
-        visible
-            .filter_map(|force| {
-                let tail = *instant.nodes.get(force.node as usize)?;
-                Some((tail, tail - scale * force.force))
-            })
-            .collect()
+        // Those under a fiftieth of the greatest would be specks.
+        let visible = instant.forces.iter().filter(|at| at.force.length() > 0.02 * self.extent.force);
+        let tail = |at: &NodeForce| instant.nodes.get(at.node as usize).copied();
+        visible.filter_map(|at| Some((tail(at)?, tail(at)? + self.extent.arrow(at.force)))).collect()
     }
 
     fn picture(&self, instant: &Instant) -> Picture {
@@ -272,9 +287,9 @@ impl<'a> Scene<'a> {
             self.rest.iter().zip(&instant.nodes).map(|pair| self.map.colour(displacement(pair))).collect();
         let nodes = &instant.nodes[..self.rest.len()];
         raster.mesh(nodes, self.triangles, &colours);
-        draw_proxy(&mut raster, self.chain, &instant.pose, LINK_THICKNESS * self.radius, &self.links);
+        draw_proxy(&mut raster, self.chain, &instant.pose, LINK_THICKNESS * self.extent.radius, &self.links);
         let arrows = self.arrows(instant).into_iter();
-        let arrows = arrows.flat_map(|(tail, tip)| Cone::arrow(tail, tip - tail, 0.022 * self.radius, FORCE));
+        let arrows = arrows.flat_map(|(tail, tip)| Cone::arrow(tail, tip - tail, 0.022 * self.extent.radius, FORCE));
         raster.cones(&arrows.collect::<Vec<_>>());
         raster.edges(nodes, self.triangles, 1.2, EDGE);
         raster.picture()
@@ -306,7 +321,8 @@ pub(crate) fn draw_proxy(
 }
 
 /// From the side of the arm and a little from where it pushes, above: the dent is seen in profile.
-pub(super) fn view(centre: DVec3, instants: &[Instant], force: DVec3) -> DVec3 {
+pub(super) fn view(centre: DVec3, instants: &[Instant]) -> DVec3 {
+    let force: DVec3 = instants.iter().flat_map(|instant| &instant.forces).map(|at| at.force).sum();
     let flat = |v: DVec3| DVec3::new(v.x, v.y, 0.0).normalize_or_zero();
     let base = instants.first().and_then(|instant| instant.pose.origins.first()).copied().unwrap_or(centre - DVec3::Y);
     let arm = flat(centre - base);

@@ -5,8 +5,8 @@ use crate::{
     JointVector,
     draw::{
         canvas::Canvas,
-        chart::{Curve, Lane, Stack},
-        colour,
+        chart::{Lane, Stack},
+        plot::Curve,
     },
     render::{
         accounts::Accounts,
@@ -26,27 +26,23 @@ pub fn press(trace: &Trace) -> Canvas {
 #[must_use]
 pub fn titled(headline: &str, trace: &Trace) -> Canvas {
     let mut lanes =
-        per_joint(trace, ["Contact torque on the proxy", "Contact force on the proxy"], true, |tick, joint| {
+        per_joint(trace, ["Contact torque on the proxy", "Contact force on the proxy"], TORQUE, |tick, joint| {
             tick.sample.torque.get(joint).copied()
         });
-    lanes.extend(per_joint(trace, ["Torque on the device", "Force on the device"], true, |tick, joint| {
+    lanes.extend(per_joint(trace, ["Torque on the device", "Force on the device"], TORQUE, |tick, joint| {
         tick.device_torque.get(joint).copied()
     }));
     let start = trace.ticks.first().map_or_else(|| JointVector::zeros(trace.joints.len()), |tick| tick.proxy);
-    lanes.extend(per_joint(trace, ["Motion from the start"; 2], false, |tick, joint| {
+    lanes.extend(per_joint(trace, ["Motion from the start"; 2], "Δq", |tick, joint| {
         Some(tick.proxy.get(joint)? - start.get(joint)?)
     }));
     // A measured dataset knows no nodes.
     if trace.ticks.iter().all(|tick| !tick.sample.contact)
         || trace.ticks.iter().any(|tick| tick.sample.contact_nodes > 0)
     {
-        let nodes = curve(trace, "", colour::series(0), |tick| f64::from(tick.sample.contact_nodes));
-        lanes.push(Lane {
-            title: "Object nodes in contact, as its grid point knows them [1]".to_owned(),
-            curves: vec![nodes],
-            height: 90.0,
-            counts: true,
-        });
+        let nodes = curve(trace, "", 0, |tick| f64::from(tick.sample.contact_nodes));
+        let title = "Object nodes in contact, as its grid point knows them [1]";
+        lanes.push(Lane { height: 90.0, counts: true, ..Lane::new(title, vec![nodes]) });
     }
     stack(headline, trace, lanes)
 }
@@ -55,17 +51,12 @@ pub fn titled(headline: &str, trace: &Trace) -> Canvas {
 #[must_use]
 pub fn energy(trace: &Trace) -> Canvas {
     type Account = (&'static str, fn(&Accounts) -> f64);
-    let lane = |title: &str, accounts: &[Account]| Lane {
-        title: title.to_owned(),
-        curves: accounts
+    let lane = |title: &str, accounts: &[Account]| {
+        let curves = accounts
             .iter()
             .enumerate()
-            .map(|(number, (name, account))| {
-                curve(trace, name, colour::series(number), |tick| 1e3 * account(&tick.accounts))
-            })
-            .collect(),
-        height: 130.0,
-        counts: false,
+            .map(|(number, (name, account))| curve(trace, name, number, |tick| 1e3 * account(&tick.accounts)));
+        Lane::new(title, curves.collect())
     };
     let kept: [Account; 3] = [
         ("stored in the object, U", |accounts| accounts.stored),
@@ -98,42 +89,42 @@ pub(super) fn stack(headline: &str, trace: &Trace, lanes: Vec<Lane>) -> Canvas {
         headline: headline.to_owned(),
         across: "Time [s]".to_owned(),
         lanes,
-        shaded: contact_intervals(&trace.ticks),
-        shade_name: "in contact".to_owned(),
+        contact: contact_intervals(&trace.ticks),
     }
     .draw()
 }
 
+/// Symbol of a torque or force.
+pub(super) const TORQUE: &str = "τ";
+
 /// A panel for each unit that occurs among the joints, with a curve for each joint of that unit; `names` are those of
-/// the quantity for joints in radians and in metres.
+/// the quantity for joints in radians and in metres, which is an effort where its `symbol` is [`TORQUE`].
 pub(super) fn per_joint(
     trace: &Trace,
     names: [&str; 2],
-    torque: bool,
+    symbol: &str,
     value: impl Fn(&Tick, usize) -> Option<f64>,
 ) -> Vec<Lane> {
     let occurs = |unit: &str| trace.joints.iter().any(|joint| joint.unit == unit);
     let units = ["rad", "m"].into_iter().zip(names).filter(|(unit, _)| occurs(unit));
     let lanes = units.map(|(unit, what)| {
         let of_unit = trace.joints.iter().enumerate().filter(|(_, joint)| joint.unit == unit);
-        let symbol = if torque { "τ" } else { "Δq" };
         let curves = of_unit.map(|(number, joint)| {
             let name = format!("{symbol}{} {}", subscript(number + 1), joint.name);
-            curve(trace, &name, colour::series(number), |tick| value(tick, number).unwrap_or(f64::NAN))
+            curve(trace, &name, number, |tick| value(tick, number).unwrap_or(f64::NAN))
         });
-        let unit = if torque { effort_unit(unit) } else { unit };
-        Lane { title: format!("{what} [{unit}]"), curves: curves.collect(), height: 130.0, counts: false }
+        let unit = if symbol == TORQUE { effort_unit(unit) } else { unit };
+        Lane::new(format!("{what} [{unit}]"), curves.collect())
     });
     let lanes: Vec<Lane> = lanes.collect();
     if lanes.is_empty() {
-        return vec![Lane::empty(names[0])];
+        return vec![Lane::new(names[0], Vec::new())];
     }
     lanes
 }
 
-pub(super) fn curve(trace: &Trace, name: &str, colour: colour::Colour, value: impl Fn(&Tick) -> f64) -> Curve {
-    let points = trace.ticks.iter().map(|tick| (tick.time, value(tick))).collect();
-    Curve { name: name.to_owned(), colour, dashed: false, points }
+pub(super) fn curve(trace: &Trace, name: &str, number: usize, value: impl Fn(&Tick) -> f64) -> Curve {
+    Curve::new(name, number, trace.ticks.iter().map(|tick| (tick.time, value(tick))))
 }
 
 /// The configuration with the largest contact torque, if there is contact (rad or m).

@@ -47,8 +47,8 @@ pub fn write(
     let surface = dataset.surface.as_ref().filter(|_| !trace.frames.is_empty()).ok_or_else(|| {
         crate::error!("there is no deformed object to write as VTU: give the scene an object and a [graphics] table")
     })?;
-    let rest: Vec<DVec3> = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
-    let triangles: Vec<Vec<u32>> = surface.triangles.chunks_exact(3).map(<[u32]>::to_vec).collect();
+    let rest: Vec<DVec3> = surface.places().collect();
+    let triangles: Vec<Vec<u32>> = surface.facets().iter().map(|facet| facet.to_vec()).collect();
     let shapes = links(&dataset.scene);
     let (mut files, mut list) = (Vec::new(), Vec::new());
     for (number, instant) in

@@ -11,9 +11,9 @@ use crate::{
     dataset::Dataset,
     draw::{
         canvas::{Anchor, Area, Canvas},
-        chart::{self, Curve, Lane, Stack},
+        chart::{self, Lane, Stack},
         colour::{self, ColourMap},
-        plot::{self, Entry, Mark, Panel, Scale},
+        plot::{self, Curve, Entry, Mark, Panel, Scale},
         ticks,
     },
 };
@@ -36,7 +36,7 @@ pub fn slices(dataset: &Dataset, through: Option<&[f64]>) -> Canvas {
     let (cell_width, cell_height) = (WIDTH / columns as f64, 260.0);
     let mut canvas = Canvas::new(WIDTH + chart::MARGIN, TOP + rows as f64 * cell_height + 12.0);
     chart::headline(&mut canvas, "Joint contact torque on a plane of C-space");
-    canvas.text((chart::TITLE_LEFT, chart::MARGIN + 32.0), &slice.caption(dataset), plot::NOTE);
+    canvas.text((chart::MARGIN, chart::MARGIN + 32.0), &slice.caption(dataset), plot::NOTE);
     slice.legend(&mut canvas, dataset);
     for joint in 0..dataset.grid.joints() {
         let corner =
@@ -370,37 +370,22 @@ pub fn torque_size(dataset: &Dataset, point: usize) -> f64 {
 /// Torque of a single joint against its coordinate.
 fn line(dataset: &Dataset) -> Canvas {
     let Some(axis) = dataset.grid.axes.first() else {
-        return Stack {
-            headline: "Joint contact torque".to_owned(),
-            across: String::new(),
-            lanes: vec![Lane::empty("no joints")],
-            shaded: vec![],
-            shade_name: String::new(),
-        }
-        .draw();
+        let (headline, lanes) = ("Joint contact torque".to_owned(), vec![Lane::new("no joints", Vec::new())]);
+        return Stack { headline, across: String::new(), lanes, contact: Vec::new() }.draw();
     };
     let points = (0..axis.count).map(|k| {
         let known = dataset.status(k) != Status::Outside;
         (axis.coordinate(k), if known { dataset.torque(k)[0] } else { f64::NAN })
     });
-    let curve = Curve { name: String::new(), colour: colour::series(0), dashed: false, points: points.collect() };
+    let title = format!("τ₁ {} [{}]", axis.name, axis.effort_unit());
+    let lane = Lane { height: 240.0, ..Lane::new(title, vec![Curve::new("", 0, points)]) };
     let numbers: Vec<usize> = (0..axis.count).collect();
-    let shaded = numbers
+    let contact = numbers
         .chunk_by(|&a, &b| dataset.status(a).is_in_contact() == dataset.status(b).is_in_contact())
         .filter(|run| dataset.status(run[0]).is_in_contact())
         .map(|run| [axis.coordinate(run[0]), axis.coordinate(run[run.len() - 1])])
         .collect();
-    Stack {
-        headline: "Joint contact torque over C-space".to_owned(),
-        across: format!("q₁ {} [{}]", axis.name, axis.unit),
-        lanes: vec![Lane {
-            title: format!("τ₁ {} [{}]", axis.name, axis.effort_unit()),
-            curves: vec![curve],
-            height: 240.0,
-            counts: false,
-        }],
-        shaded,
-        shade_name: "in contact".to_owned(),
-    }
-    .draw()
+    let (headline, across) =
+        ("Joint contact torque over C-space".to_owned(), format!("q₁ {} [{}]", axis.name, axis.unit));
+    Stack { headline, across, lanes: vec![lane], contact }.draw()
 }

@@ -58,7 +58,7 @@ pub fn space(dataset: &Dataset) -> Canvas {
     let mut canvas = Canvas::new(WIDTH, PICTURE.bottom() + 4.0);
     chart::headline(&mut canvas, "Haptized data in the C-space of the proxy");
     let untrusted = points.iter().filter(|point| !trusted(point)).count();
-    canvas.text((chart::TITLE_LEFT, chart::MARGIN + 32.0), &caption(dataset, &points), plot::NOTE);
+    canvas.text((chart::MARGIN, chart::MARGIN + 32.0), &caption(dataset, &points), plot::NOTE);
     if untrusted > 0 {
         let entry = Entry { name: format!("{untrusted} not converged"), colour: UNTRUSTED, mark: Mark::Dot };
         plot::legend(&mut canvas, (WIDTH - chart::MARGIN, chart::MARGIN + 12.0), &[entry]);

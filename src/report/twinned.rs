@@ -1,10 +1,10 @@
 //! What the twin of a real object errs by along a session, and where it answered.
 
-use super::press::{curve, per_joint, stack};
+use super::press::{TORQUE, curve, per_joint, stack};
 use crate::{
     JointVector,
     contact::Solver,
-    draw::{canvas::Canvas, chart::Lane, colour},
+    draw::{canvas::Canvas, chart::Lane},
     render::{
         trace::{Tick, Trace},
         twinned::TwinnedField,
@@ -53,13 +53,13 @@ impl TwinError {
     #[must_use]
     pub fn draw(&self, trace: &Trace) -> Canvas {
         let felt = ["Contact torque on the proxy", "Contact force on the proxy"];
-        let mut lanes = per_joint(trace, felt, true, |tick, joint| tick.sample.torque.get(joint).copied());
+        let mut lanes = per_joint(trace, felt, TORQUE, |tick, joint| tick.sample.torque.get(joint).copied());
         let at = |time: f64| self.errors.partition_point(|(instant, _)| *instant <= time).checked_sub(1);
         let error = |tick: &Tick, joint: usize| self.errors[at(tick.time)?].1.as_ref()?.get(joint).copied();
         let names = ["Torque of the twin less what was measured", "Force of the twin less what was measured"];
-        lanes.extend(per_joint(trace, names, true, error));
-        let share = curve(trace, "", colour::series(0), |tick| tick.sample.twin);
-        lanes.push(Lane { title: "Share of the twin [1]".into(), curves: vec![share], height: 90.0, counts: false });
+        lanes.extend(per_joint(trace, names, TORQUE, error));
+        let share = curve(trace, "", 0, |tick| tick.sample.twin);
+        lanes.push(Lane { height: 90.0, ..Lane::new("Share of the twin [1]", vec![share]) });
         stack("What was measured is felt, and beyond it the twin", trace, lanes)
     }
 }

@@ -60,7 +60,6 @@ pub use plan::{Plan, ShardCost};
 pub(crate) use reach::shallow;
 pub use reach::{DepthShare, JointReach, Reach};
 pub use reference::{REFERENCE_TOLERANCE, Reference};
-pub use region::model_within;
-use region::sample;
+pub use region::{model_within, sample};
 pub use report::{Iterations, SweepReport};
 pub use shard::{EXTENSION as SHARD_EXTENSION, Shard, ranges};

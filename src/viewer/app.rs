@@ -27,6 +27,8 @@ use eframe::{egui, egui_wgpu::RenderState};
 use std::{
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool},
+    thread,
+    time::Duration,
 };
 
 /// The scene or file that is opened first.
@@ -53,8 +55,8 @@ impl Start {
         };
         let remedy = "give a scene (.toml) or a dataset (.haptize)";
         files.into_iter().try_for_each(|path| {
-            let unreadable = |error| ViewError::Open(format!("{}: cannot be read: {error}; {remedy}", path.display()));
-            input::open(path).map(drop).map_err(unreadable)
+            let unreadable = |error| format!("{}: cannot be read: {error}; {remedy}", path.display());
+            input::open(path).map(drop).map_err(|error| unreadable(error).into())
         })
     }
 }
@@ -110,6 +112,9 @@ const UNMOVED: f64 = 1e-3;
 
 /// Longest time between two frames of a moving window (s); a longer one was at rest.
 const LONGEST_FRAME: f64 = 1.0;
+
+/// How often is looked whether what is waited for is there.
+const LOOK: Duration = Duration::from_millis(2);
 
 /// Share of the latest frame in the frame rate that is shown (1).
 const LATEST: f64 = 0.1;
@@ -214,15 +219,34 @@ impl Viewer {
         }
     }
 
-    /// Waits until what is being opened is open, and drawn as it is to be; for pictures and tests.
+    /// Waits until what is being opened is open, and felt and drawn as it is to be; for pictures and tests.
     pub fn wait(&mut self) {
-        if let Some(job) = self.job.take() {
-            self.take(job.wait());
+        loop {
+            self.follow(|| ());
+            if !self.is_making() {
+                return;
+            }
+            thread::sleep(LOOK);
         }
-        if let Some(session) = &mut self.session {
-            let redrawn = self.scene.wait(&session.loaded, &session.controls.tuning.graphics).map_err(not_drawn);
-            self.error = redrawn.and_then(|()| session.wait()).err().or(self.error.take());
+    }
+
+    /// Whether something is being made in the background.
+    fn is_making(&self) -> bool {
+        let retunes = self.session.as_ref().is_some_and(Session::is_retuning);
+        self.job.is_some() || retunes || self.scene.is_redrawing()
+    }
+
+    /// Takes what was made in the background, and lets loop and object follow the controls; `wake` is called when there
+    /// is news.
+    fn follow(&mut self, wake: impl FnOnce() + Clone + Send + 'static) {
+        if let Some(outcome) = self.job.as_mut().and_then(Job::poll) {
+            self.job = None;
+            self.take(outcome);
         }
+        let Some(session) = &mut self.session else { return };
+        let effects = &session.controls.tuning.graphics;
+        let redrawn = self.scene.follow(&session.loaded, effects, wake.clone()).map_err(not_drawn);
+        self.error = redrawn.and_then(|()| session.follow(wake)).err().or(self.error.take());
     }
 
     fn take(&mut self, outcome: JobResult) {
@@ -345,13 +369,19 @@ impl Viewer {
                 Err(error) => self.error = Some(not_drawn(error.into())),
             }
         }
-        let written = self.written.as_ref().and_then(Pending::poll);
-        match written.map(|written| written.and_then(|file| file.map_err(|error| error.to_string()))) {
-            Some(Ok(file)) => self.notice = Some(Notice::new(format!("wrote {}", file.display()))),
-            Some(Err(error)) => self.error = Some(error),
-            None => return,
+        if let Some(written) = self.written.as_ref().and_then(Pending::poll) {
+            self.written = None;
+            let file = written.and_then(|file| file.map_err(|error| error.to_string()));
+            self.told(file.map(|file| format!("wrote {}", file.display())));
         }
-        self.written = None;
+    }
+
+    /// Shows what was done, or why not.
+    pub(super) fn told(&mut self, outcome: Result<String, String>) {
+        match outcome {
+            Ok(text) => self.notice = Some(Notice::new(text)),
+            Err(error) => self.error = Some(error),
+        }
     }
 
     /// The 3-D picture of what is open, of `size` pixels.
@@ -363,7 +393,7 @@ impl Viewer {
             Some(session) => self.scene.picture(size, &session.loaded, visuals)?,
             None => None,
         };
-        picture.ok_or_else(|| ViewError::Open("nothing is open".into()))
+        picture.ok_or_else(|| Error::from("nothing is open").into())
     }
 
     /// Begins a film of the 3-D picture, or ends it.
@@ -385,24 +415,17 @@ impl Viewer {
         let (Some(session), Some(size)) = (&self.session, self.scene.size()) else { return };
         let file = self.files.fresh(&session.loaded.name, "png");
         let drawn = self.picture(size.map(|side| 2 * side), visuals);
-        match drawn.and_then(|(size, bytes)| write_picture(&file, size, &bytes)) {
-            Ok(()) => self.notice = Some(Notice::new(format!("wrote {}", file.display()))),
-            Err(error) => self.error = Some(not_drawn(error)),
-        }
+        let written = drawn.and_then(|(size, bytes)| write_picture(&file, size, &bytes));
+        self.told(written.map(|()| format!("wrote {}", file.display())).map_err(not_drawn));
     }
 
     /// Whether nothing moves and nothing is made, so that another frame would look the same.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         // A device moves when it likes.
-        let busy =
-            |session: &Session| session.lead.is_some() || session.feel.guide().is_running() || session.is_retuning();
-        self.job.is_none()
-            && self.film.is_none()
-            && self.written.is_none()
-            && !self.session.as_ref().is_some_and(busy)
-            && !self.scene.is_redrawing()
-            && self.still > SETTLED
+        let moves = |session: &Session| session.lead.is_some() || session.feel.guide().is_running();
+        let is_filmed = self.film.is_some() || self.written.is_some();
+        !(self.is_making() || is_filmed || self.session.as_ref().is_some_and(moves)) && self.still > SETTLED
     }
 
     /// Lets `elapsed` (s) go by: the loop where it runs by steps, the object, and what is in the background.
@@ -411,18 +434,10 @@ impl Viewer {
             let rate = self.frame_rate.map_or(elapsed, |rate| (1.0 - LATEST) / rate + LATEST * elapsed).recip();
             self.frame_rate = Some(rate);
         }
-        if let Some(outcome) = self.job.as_mut().and_then(Job::poll) {
-            self.job = None;
-            self.take(outcome);
-        }
         self.record(elapsed);
+        let egui = egui.clone();
+        self.follow(move || egui.request_repaint());
         let Some(session) = &mut self.session else { return };
-        let wake = || {
-            let egui = egui.clone();
-            move || egui.request_repaint()
-        };
-        let redrawn = self.scene.follow(&session.loaded, &session.controls.tuning.graphics, wake()).map_err(not_drawn);
-        self.error = redrawn.and_then(|()| session.follow(wake())).err().or(self.error.take());
         session.feel.step((elapsed / session.loaded.setup.haptics.period()).round() as usize);
         session.history.collect(&mut session.feel);
         session.go_on_without_a_device();

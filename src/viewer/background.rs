@@ -12,7 +12,7 @@ pub struct Pending<T> {
 }
 
 /// Message for a thread that ended without its result.
-pub const ENDED: &str = "the work ended unexpectedly; please report this";
+const ENDED: &str = "the work ended unexpectedly; please report this";
 
 impl<T: Send + 'static> Pending<T> {
     /// Begins to `make` it in a thread called `name`; `wake` is called once it is there.
@@ -84,7 +84,7 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
     ) -> Result<Option<T>, String> {
         let made = self.coming.as_ref().and_then(|(_, coming)| coming.poll());
         if made.is_some() {
-            self.over();
+            self.last = self.coming.take().map(|(wanted, _)| wanted);
         }
         if self.coming.is_none() && self.last.as_ref() != Some(wanted) {
             let asked = wanted.clone();
@@ -97,20 +97,6 @@ impl<W: Clone + PartialEq + Send + 'static, T: Send + 'static> Following<W, T> {
             }
         }
         made.transpose()
-    }
-
-    /// The one that is being made, once it is there; none where none is.
-    ///
-    /// # Errors
-    /// In words, when the thread ended without it.
-    pub fn wait(&mut self) -> Result<Option<T>, String> {
-        self.over().map(Pending::wait).transpose()
-    }
-
-    fn over(&mut self) -> Option<Pending<T>> {
-        let (wanted, coming) = self.coming.take()?;
-        self.last = Some(wanted);
-        Some(coming)
     }
 }
 
@@ -143,10 +129,13 @@ mod tests {
             assert!(following.is_busy());
         }
         open.send(()).unwrap();
-        assert_eq!(following.wait(), Ok(Some(1)));
-        assert_eq!(following.follow(&3, "test", |wanted| *wanted, || ()), Ok(None));
-        assert_eq!(following.wait(), Ok(Some(3)));
-        assert_eq!((following.wait(), following.is_busy()), (Ok(None), false));
+        let mut next = || loop {
+            if let Some(made) = following.follow(&3, "test", |wanted| *wanted, || ()).unwrap() {
+                return (made, following.is_busy());
+            }
+            std::thread::yield_now();
+        };
+        assert_eq!([next(), next()], [(1, true), (3, false)]);
     }
 
     #[test]

@@ -1,7 +1,12 @@
 //! The object in the window: its nodes advanced by the interpolated contact forces, frame after frame: on the GPU, or on
 //! the CPU where that moves it no better (see [`FrameUpdate::suits`]), or it relaxes.
 
-use super::{links::filled, loaded::Loaded, probe::Probe, view_renderer::Surface};
+use super::{
+    links::filled,
+    loaded::Loaded,
+    probe::Probe,
+    view_renderer::{Quantity, Surface},
+};
 use crate::{
     Error, JointVector,
     contact::Status,
@@ -30,7 +35,7 @@ pub struct Body {
     rest: Vec<Vec3>,
     /// Largest displacement at rest (m) and contact force on a node (N) of the motions that can be played; of the whole
     /// dataset where these touch nothing.
-    pub extremes: [f64; 2],
+    extremes: [f64; 2],
     contact: Arc<ContactForces>,
     forces: DrawnForces,
     /// Time between two frames of the object (s).
@@ -49,8 +54,6 @@ enum Motion {
 
 struct HostMotion {
     moved: MovedObject,
-    /// Forces of contact and of the object's past (N).
-    sum: Vec<DVec3>,
     context: Arc<Context>,
     /// Displacements (m) and contact forces (N) of the object's nodes, four numbers a node.
     drawn: [wgpu::Buffer; 2],
@@ -132,10 +135,14 @@ impl Body {
         self.owed -= due * self.period;
         let began = Instant::now();
         for _ in 0..(due as usize).min(MOST_FRAMES) {
-            let [contact, past] = self.forces.frame();
+            let forces = self.forces.frame();
             match &mut self.motion {
-                Motion::Device(update) => update.step(contact)?,
-                Motion::Host(host) if began.elapsed() < MOST_TIME => host.step(contact, past),
+                Motion::Device(update) => update.step(forces)?,
+                Motion::Host(host) if began.elapsed() < MOST_TIME => {
+                    host.moved.with_dependent_mut(|_, motion| {
+                        motion.step(forces);
+                    });
+                }
                 Motion::Host(_) => {}
             }
         }
@@ -143,6 +150,12 @@ impl Body {
             Motion::Host(host) if due > 0.0 => host.show(self.forces.contact()),
             _ => Ok(()),
         }
+    }
+
+    /// What is shown deepest of `quantity` (m or N).
+    #[must_use]
+    pub fn most(&self, quantity: Quantity) -> f64 {
+        self.extremes[usize::from(quantity == Quantity::Force)]
     }
 
     /// Place of `node` at rest (m).
@@ -195,19 +208,9 @@ impl HostMotion {
         };
         let drawn =
             context.scoped(|device| ["drawn displacements", "drawn forces"].map(|label| buffer(device, label)))?;
-        let host = Self { moved, sum: vec![DVec3::ZERO; nodes], context: Arc::clone(context), drawn };
+        let host = Self { moved, context: Arc::clone(context), drawn };
         host.show(&[])?;
         Ok(host)
-    }
-
-    /// One frame under forces of `contact` and of the `past` (N).
-    fn step(&mut self, contact: &[DVec3], past: &[DVec3]) {
-        let Self { moved, sum, .. } = self;
-        sum.copy_from_slice(contact);
-        sum.iter_mut().zip(past).for_each(|(sum, past)| *sum += *past);
-        moved.with_dependent_mut(|_, motion| {
-            motion.step(sum);
-        });
     }
 
     /// Gives the device the nodes as they are, and the forces of `contact` on them (N).
@@ -279,7 +282,7 @@ mod tests {
         scene::Scene,
         viewer::{
             pixels,
-            view_renderer::{Look, Quantity, ViewRenderer},
+            view_renderer::{Look, ViewRenderer},
         },
     };
 
@@ -301,11 +304,11 @@ mod tests {
             let mut seen = Vec::new();
             for elapsed in [0.0, 0.05] {
                 body.advance(&latest, elapsed).unwrap();
-                for (quantity, top) in [Quantity::Displacement, Quantity::Force].into_iter().zip(body.extremes) {
+                for quantity in [Quantity::Displacement, Quantity::Force] {
                     let look = Look {
                         background: [0.0; 3],
                         quantity,
-                        colour_top: top as f32,
+                        colour_top: body.most(quantity) as f32,
                         edge_width: 0.0,
                         object: glam::DAffine3::IDENTITY,
                         ground: (-1.0, [0.0; 3]),

@@ -4,6 +4,7 @@
 use super::{
     gains,
     job::Solver,
+    legend::choice,
     loaded::Loaded,
     palette,
     scene::Shown,
@@ -13,7 +14,7 @@ use super::{
 use crate::render::passivity::Advice;
 use crate::scene::{ContactLaw, EFFECTS, Effect, Interpolation, Scene, Tuning};
 use clap::ValueEnum as _;
-use eframe::egui::{Align, Button, ComboBox, DragValue, Layout, Response, RichText, Ui};
+use eframe::egui::{Align, Button, DragValue, Layout, Response, RichText, Ui};
 use std::sync::Arc;
 
 /// The panel's state.
@@ -112,22 +113,17 @@ impl Controls {
         ui.horizontal(|ui| {
             let label = ui.label("Interpolation").on_hover_text("How the torque follows from the grid points around");
             let chosen = &mut self.tuning.haptics.interpolation;
-            ComboBox::from_id_salt("interpolation")
-                .width(CHOICE_WIDTH)
-                .selected_text(chosen.name())
-                .show_ui(ui, |ui| {
-                    for interpolation in Interpolation::ALL {
-                        let lacking = lacking(interpolation, loaded);
-                        ui.add_enabled_ui(lacking.is_none(), |ui| {
-                            let choice = ui.selectable_value(chosen, interpolation, interpolation.name());
-                            if let Some(lacking) = lacking {
-                                choice.on_disabled_hover_text(lacking);
-                            }
-                        });
-                    }
-                })
-                .response
-                .labelled_by(label.id);
+            choice(ui, &label, "interpolation", Some(CHOICE_WIDTH), chosen.name(), |ui| {
+                for interpolation in Interpolation::ALL {
+                    let lacking = lacking(interpolation, loaded);
+                    ui.add_enabled_ui(lacking.is_none(), |ui| {
+                        let choice = ui.selectable_value(chosen, interpolation, interpolation.name());
+                        if let Some(lacking) = lacking {
+                            choice.on_disabled_hover_text(lacking);
+                        }
+                    });
+                }
+            });
         });
     }
 
@@ -173,31 +169,20 @@ impl Controls {
             let label = ui.label("Solve").on_hover_text(
                 "The law of contact: depths and directions before the surface at rest, or before the deformed one",
             );
-            ComboBox::from_id_salt("law")
-                .width(CHOICE_WIDTH)
-                .selected_text(contact.law.name())
-                .show_ui(ui, |ui| {
-                    for &law in ContactLaw::value_variants() {
-                        ui.selectable_value(&mut contact.law, law, law.name());
-                    }
-                })
-                .response
-                .labelled_by(label.id);
+            choice(ui, &label, "law", Some(CHOICE_WIDTH), contact.law.name(), |ui| {
+                for &law in ContactLaw::value_variants() {
+                    ui.selectable_value(&mut contact.law, law, law.name());
+                }
+            });
         });
         ui.horizontal(|ui| {
             let label = ui.label("on").on_hover_text("The CPU or a GPU");
-            ComboBox::from_id_salt("solver")
-                .width(ui.available_width())
-                .truncate()
-                .selected_text(self.solver.to_string())
-                .show_ui(ui, |ui| {
-                    for solver in solvers {
-                        let choice = ui.selectable_value(&mut self.solver, solver.clone(), solver.to_string());
-                        choice.on_hover_text(solver.what());
-                    }
-                })
-                .response
-                .labelled_by(label.id);
+            choice(ui, &label, "solver", None, self.solver.to_string(), |ui| {
+                for solver in solvers {
+                    let choice = ui.selectable_value(&mut self.solver, solver.clone(), solver.to_string());
+                    choice.on_hover_text(solver.what());
+                }
+            });
         });
         ui.horizontal(|ui| {
             let label = ui.label("Contact Kc [N/m]").on_hover_text("Stiffness of a contact spring");

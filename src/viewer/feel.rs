@@ -39,19 +39,34 @@ pub enum TickSource {
 
 /// The loop as the window holds it. Dropping it ends its threads.
 pub struct Feel {
-    guide: Arc<Mutex<Guide>>,
+    shared: Arc<Shared>,
     ticks: rtrb::Consumer<Tick>,
     costs: rtrb::Consumer<Duration>,
     latest: triple_buffer::Output<Latest>,
     clear: ClearFault,
-    stop: Arc<AtomicBool>,
     steps: Option<mpsc::Sender<usize>>,
     stepped: mpsc::Receiver<()>,
     refused: mpsc::Receiver<Vec<String>>,
     returned: mpsc::Receiver<Box<dyn Device>>,
     threads: Vec<JoinHandle<()>>,
+}
+
+/// What window and threads share.
+struct Shared {
+    guide: Mutex<Guide>,
+    /// Ends the threads.
+    stop: AtomicBool,
+    /// Whether the hand of a simulated device is still.
+    is_still: AtomicBool,
     /// Whether every tick is waited for, even while the hand is still.
-    keeps_pace: Arc<AtomicBool>,
+    keeps_pace: AtomicBool,
+}
+
+impl Shared {
+    fn guide(&self) -> MutexGuard<'_, Guide> {
+        // A guide is a plain value: a panic elsewhere leaves nothing half-written that would matter.
+        self.guide.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// How often the hand's goal is moved.
@@ -69,15 +84,13 @@ const RING: usize = 1 << 14;
 
 /// Everything that the haptic thread owns.
 struct Body {
+    shared: Arc<Shared>,
     haptics: Arc<Haptics>,
     device: Box<dyn Device>,
     /// Takes what ticks cost.
     cost: rtrb::Producer<Duration>,
-    stop: Arc<AtomicBool>,
     /// Whether the device is the simulated one that is led, which may wait a little longer.
     is_led: bool,
-    /// Whether its hand is still; never that of another device.
-    is_still: Arc<AtomicBool>,
     /// Takes the device in the end.
     give_back: mpsc::Sender<Box<dyn Device>>,
 }
@@ -87,7 +100,7 @@ type Began = Result<(Ends, ClearFault), Error>;
 
 /// Steps that the caller asks for.
 struct Steps {
-    guide: Arc<Mutex<Guide>>,
+    shared: Arc<Shared>,
     input: Option<PointerInput>,
     asked: mpsc::Receiver<usize>,
     done: mpsc::Sender<()>,
@@ -111,7 +124,7 @@ impl Steps {
         }
         self.left = self.left.map(|left| left - 1);
         if let Some(input) = &mut self.input {
-            let goal = lock(&self.guide).follow(period);
+            let goal = self.shared.guide().follow(period);
             let _ = input.move_to(&goal);
         }
         true
@@ -138,44 +151,42 @@ impl Feel {
             }
         };
         let is_led = input.is_some();
-        let guide = Arc::new(Mutex::new(guide));
-        let stop = Arc::new(AtomicBool::new(false));
+        let [stop, is_still, keeps_pace] = [(); 3].map(|()| AtomicBool::new(false));
+        let shared = Arc::new(Shared { guide: Mutex::new(guide), stop, is_still, keeps_pace });
+        let own = || Arc::clone(&shared);
         let (cost, costs) = rtrb::RingBuffer::new(RING);
         let (give_back, returned) = mpsc::channel();
-        let [is_still, keeps_pace] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
-        let (still, pace_is_kept) = (Arc::clone(&is_still), Arc::clone(&keeps_pace));
-        let body = Body { haptics, device, cost, stop: Arc::clone(&stop), is_led, is_still, give_back };
+        let body = Body { shared: own(), haptics, device, cost, is_led, give_back };
         let (report, began) = mpsc::channel();
         let (refuse, refused) = mpsc::channel();
         let (acknowledge, stepped) = mpsc::channel();
         let (steps, asked) = mpsc::channel();
         let mut threads = Vec::new();
-        let (leader, over) = (Arc::clone(&guide), Arc::clone(&stop));
         let steps = match pace {
             TickSource::Clock => {
                 let felt = spawn("haptic", move || body.run(None, &report, &refuse))?;
                 let feeling = felt.thread().clone();
                 threads.push(felt);
                 if let Some(input) = input {
-                    let leader = Leader { guide: leader, input, is_still: still, keeps_pace: pace_is_kept, feeling };
-                    threads.push(spawn("guide", move || leader.lead(&over))?);
+                    let leader = Leader { shared: own(), input, feeling };
+                    threads.push(spawn("guide", move || leader.lead())?);
                 }
                 None
             }
             TickSource::Steps => {
-                let asked = Steps { guide: leader, input, asked, done: acknowledge, left: None };
+                let asked = Steps { shared: own(), input, asked, done: acknowledge, left: None };
                 threads.push(spawn("haptic", move || body.run(Some(asked), &report, &refuse))?);
                 Some(steps)
             }
         };
         let ended = "the haptic thread ended before its first tick; start haptize again".to_owned();
         let (Ends { ticks, latest }, clear) = began.recv().map_err(|_| ended)?.map_err(|error| error.to_string())?;
-        Ok(Self { guide, ticks, costs, latest, clear, stop, steps, stepped, refused, returned, threads, keeps_pace })
+        Ok(Self { shared, ticks, costs, latest, clear, steps, stepped, refused, returned, threads })
     }
 
     /// Ends the loop and gives back the device, without torque; none where its thread ended before.
     pub fn end(&mut self) -> Option<Box<dyn Device>> {
-        self.stop.store(true, Ordering::Release);
+        self.shared.stop.store(true, Ordering::Release);
         self.steps = None;
         for thread in self.threads.drain(..) {
             // A thread that panicked has said so already.
@@ -186,7 +197,7 @@ impl Feel {
 
     /// The hand's leader. The haptic thread never locks it.
     pub fn guide(&self) -> MutexGuard<'_, Guide> {
-        lock(&self.guide)
+        self.shared.guide()
     }
 
     /// Does `count` ticks and waits for them, where the loop runs by steps.
@@ -201,7 +212,7 @@ impl Feel {
 
     /// Whether ticks are waited for even while the hand is still, for whom looks at how punctual they are.
     pub fn keep_pace(&self, keeps_pace: bool) {
-        self.keeps_pace.store(keeps_pace, Ordering::Release);
+        self.shared.keeps_pace.store(keeps_pace, Ordering::Release);
     }
 
     /// Lets the loop start again after a fault.
@@ -237,44 +248,36 @@ impl Drop for Feel {
     }
 }
 
-fn lock(guide: &Mutex<Guide>) -> MutexGuard<'_, Guide> {
-    // A guide is a plain value: a panic elsewhere leaves nothing half-written that would matter.
-    guide.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// The part that moves the hand's goal.
 struct Leader {
-    guide: Arc<Mutex<Guide>>,
+    shared: Arc<Shared>,
     input: PointerInput,
-    /// Whether the hand is still.
-    is_still: Arc<AtomicBool>,
-    /// See [`Feel::keeps_pace`].
-    keeps_pace: Arc<AtomicBool>,
-    /// The haptic thread, which waits while it is.
+    /// The haptic thread, which waits while the hand is still.
     feeling: Thread,
 }
 
 impl Leader {
     /// Moves the goal until the loop is over.
-    fn lead(mut self, over: &AtomicBool) {
+    fn lead(mut self) {
+        let Shared { stop, is_still, keeps_pace, .. } = &*self.shared;
         let mut last = Instant::now();
         let (mut before, mut looks) = (None, 0);
-        while !over.load(Ordering::Acquire) {
+        while !stop.load(Ordering::Acquire) {
             let now = Instant::now();
-            let goal = lock(&self.guide).follow((now - last).as_secs_f64());
+            let goal = self.shared.guide().follow((now - last).as_secs_f64());
             last = now;
             // A goal that is none is refused, and the hand stays.
             let _ = self.input.move_to(&goal);
             let rests = before == Some(goal);
             looks = if rests { looks + 1 } else { 0 };
-            let is_still = looks >= LOOKS_UNTIL_STILL && !self.keeps_pace.load(Ordering::Acquire);
-            if self.is_still.swap(is_still, Ordering::AcqRel) && !is_still {
+            let rested = looks >= LOOKS_UNTIL_STILL && !keeps_pace.load(Ordering::Acquire);
+            if is_still.swap(rested, Ordering::AcqRel) && !rested {
                 self.feeling.unpark();
             }
             std::thread::sleep(if rests { GUIDE_AT_REST } else { GUIDE_PERIOD });
             before = Some(goal);
         }
-        self.is_still.store(false, Ordering::Release);
+        is_still.store(false, Ordering::Release);
         self.feeling.unpark();
     }
 }
@@ -282,7 +285,7 @@ impl Leader {
 impl Body {
     /// Runs the loop by `steps`, or else by the device's clock.
     fn run(mut self, mut steps: Option<Steps>, report: &mpsc::Sender<Began>, refuse: &mpsc::Sender<Vec<String>>) {
-        let (haptics, stop, is_led, is_still) = (&self.haptics, &self.stop, self.is_led, &self.is_still);
+        let (haptics, is_led, Shared { stop, is_still, .. }) = (&self.haptics, self.is_led, &*self.shared);
         let patience = || {
             let waits = if is_still.load(Ordering::Acquire) {
                 Patience::Rests

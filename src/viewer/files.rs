@@ -28,17 +28,6 @@ struct Entry {
     folder: bool,
 }
 
-/// See [`Files::fresh`].
-pub fn fresh(folder: &Path, name: &str, extension: &str) -> PathBuf {
-    let is_plain = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
-    let name: String = name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
-    let name = if name.trim_matches(['.', '-']).is_empty() { "haptize" } else { &name };
-    let numbered = (2..).map(|number| format!("{name}-{number}"));
-    let mut files =
-        std::iter::once(name.to_owned()).chain(numbered).map(|name| folder.join(format!("{name}.{extension}")));
-    files.find(|file| file.symlink_metadata().is_err()).unwrap_or_default()
-}
-
 /// Files opened before that are kept.
 const RECENT: usize = 6;
 
@@ -67,7 +56,12 @@ impl Files {
     /// needed. Returns `name` with a hyphen for every character that is no letter, digit, dot or underscore.
     #[must_use]
     pub fn fresh(&self, name: &str, extension: &str) -> PathBuf {
-        fresh(&self.folder, name, extension)
+        let is_plain = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
+        let name: String = name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect();
+        let name = if name.trim_matches(['.', '-']).is_empty() { "haptize" } else { &name };
+        let names = std::iter::once(name.to_owned()).chain((2..).map(|number| format!("{name}-{number}")));
+        let mut files = names.map(|name| self.folder.join(format!("{name}.{extension}")));
+        files.find(|file| file.symlink_metadata().is_err()).unwrap_or_default()
     }
 
     /// Remembers that `file` was opened.

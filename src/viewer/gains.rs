@@ -2,7 +2,7 @@
 
 use super::{
     legend, number, palette,
-    theme::{self, FINE_GAP, MARK_HEIGHT, MARK_WIDTH, NUMBER_WIDTH, SAMPLE},
+    theme::{self, FINE_GAP, JOINT_WIDTH, MARK_HEIGHT, MARK_WIDTH, NUMBER_WIDTH, SAMPLE},
 };
 use crate::{
     JointVector,
@@ -10,7 +10,7 @@ use crate::{
     render::passivity,
     scene::{HapticsSpec, Interpolation},
 };
-use eframe::egui::{self, ComboBox, DragValue, Response, Slider, SliderClamping, Stroke, Ui, lerp, pos2, vec2};
+use eframe::egui::{self, DragValue, Response, Slider, SliderClamping, Stroke, Ui, lerp, pos2, vec2};
 use std::ops::RangeInclusive;
 
 /// One gain of the loop.
@@ -91,16 +91,12 @@ pub fn joint(ui: &mut Ui, axes: &[Axis], chosen: &mut Option<usize>) {
     ui.horizontal(|ui| {
         let label = ui.label("Joint");
         let name = chosen.map_or("all", |joint| &axes[joint].name);
-        ComboBox::from_id_salt("joint")
-            .selected_text(name)
-            .show_ui(ui, |ui| {
-                ui.selectable_value(chosen, None, "all");
-                for (joint, axis) in axes.iter().enumerate() {
-                    ui.selectable_value(chosen, Some(joint), &axis.name);
-                }
-            })
-            .response
-            .labelled_by(label.id);
+        legend::choice(ui, &label, "joint", Some(JOINT_WIDTH), name, |ui| {
+            ui.selectable_value(chosen, None, "all");
+            for (joint, axis) in axes.iter().enumerate() {
+                ui.selectable_value(chosen, Some(joint), &axis.name);
+            }
+        });
     });
 }
 

@@ -66,23 +66,28 @@ impl Guide {
     #[must_use]
     pub fn new(loaded: &Loaded) -> Self {
         let limits = loaded.setup.chain.joints.iter().map(|joint| joint.limits).collect();
-        let mut guide = Self {
-            motions: loaded.motions(),
+        let mut guide = Self { motions: loaded.motions(), ..Self::at(loaded.start(), limits) };
+        guide.point(loaded.start());
+        guide
+    }
+
+    /// The hand rests at `home`, its joints within `limits`, and there are no motions.
+    fn at(home: JointVector, limits: Vec<[f64; 2]>) -> Self {
+        Self {
+            motions: Vec::new(),
             playing: None,
             running: false,
             time: 0.0,
-            goal: loaded.start(),
+            goal: home,
             limits,
             handed_over: false,
-            home: loaded.start(),
+            home,
             approach: None,
             keys: None,
             silence: 0.0,
             window: None,
             unasked: 0.0,
-        };
-        guide.point(loaded.start());
-        guide
+        }
     }
 
     /// Leaves the lead to a haptic device: there are no motions then, and nothing for a pointer to take.
@@ -251,21 +256,8 @@ mod tests {
     /// and says so.
     fn guide() -> Guide {
         let [start, home] = [[0.0, 0.0], [0.5, 0.1]].map(|q| JointVector::from_slice(&q));
-        Guide {
-            motions: Vec::new(),
-            playing: None,
-            running: false,
-            time: 0.0,
-            goal: start,
-            limits: vec![[-1.0, 1.0], [-0.2, 0.2]],
-            handed_over: false,
-            home,
-            approach: None,
-            keys: Some(Keys::default()),
-            silence: f64::NEG_INFINITY,
-            window: None,
-            unasked: 0.0,
-        }
+        let (keys, silence) = (Some(Keys::default()), f64::NEG_INFINITY);
+        Guide { home, keys, silence, ..Guide::at(start, vec![[-1.0, 1.0], [-0.2, 0.2]]) }
     }
 
     fn keys(first: [f64; 2]) -> Option<Keys> {

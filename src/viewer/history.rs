@@ -27,13 +27,16 @@ pub struct History {
     begun: f64,
     /// Whether no tick of this loop was seen yet.
     new: bool,
-    /// Whether the arm was free since the first loop began.
-    was_free: bool,
-    cost: Durations,
-    jitter: Durations,
-    /// The same while the window held still.
-    still: Durations,
-    refused: Vec<String>,
+    /// Whether the arm was free since the first loop began: only then is it known from which side it met the object.
+    pub was_free: bool,
+    /// From a tick's reading to its torque.
+    pub cost: Durations,
+    /// Difference of the time between two ticks from the nominal one.
+    pub jitter: Durations,
+    /// The same while the window held still; nothing where it has not.
+    pub still: Durations,
+    /// Requests that the system refused, in words.
+    pub refused: Vec<String>,
 }
 
 impl History {
@@ -101,12 +104,6 @@ impl History {
         self.ticks.back()
     }
 
-    /// Whether the arm was free since the session began: only then is it known from which side it met the object.
-    #[must_use]
-    pub fn was_free(&self) -> bool {
-        self.was_free
-    }
-
     /// About `count` ticks of the last `seconds`, evenly, always the same ones while time goes on.
     pub fn recent(&self, seconds: f64, count: usize) -> impl Iterator<Item = &Tick> {
         let from = self.last().map_or(0.0, |tick| tick.time - seconds);
@@ -121,30 +118,6 @@ impl History {
     pub fn trace(&self, loaded: &Loaded) -> Trace {
         let joints = labels(&loaded.dataset.grid);
         Trace { joints, ticks: self.ticks.iter().copied().collect(), ..Trace::default() }
-    }
-
-    /// From a tick's reading to its torque.
-    #[must_use]
-    pub fn cost(&self) -> &Durations {
-        &self.cost
-    }
-
-    /// Difference of the time between two ticks from the nominal one.
-    #[must_use]
-    pub fn jitter(&self) -> &Durations {
-        &self.jitter
-    }
-
-    /// The same while the window held still; nothing where it has not.
-    #[must_use]
-    pub fn still(&self) -> &Durations {
-        &self.still
-    }
-
-    /// Returns the requests that the system refused, in words.
-    #[must_use]
-    pub fn refused(&self) -> &[String] {
-        &self.refused
     }
 
     /// Forgets how punctual the loop was so far.

@@ -2,7 +2,7 @@
 //! be cancelled, and ends with something [`Loaded`] or with the reason in words.
 
 use super::{
-    background::{ENDED, spawn},
+    background::Pending,
     body::Body,
     loaded::Loaded,
     placing::{Edit, edited},
@@ -23,7 +23,6 @@ use std::{
         atomic::{AtomicBool, Ordering},
         mpsc,
     },
-    thread,
     time::SystemTime,
 };
 
@@ -119,14 +118,11 @@ pub enum JobResult {
 pub struct Job {
     /// The work that it does, for its progress bar.
     pub title: String,
-    progress: Progress,
+    /// How far it has come, as far as is known.
+    pub progress: Progress,
+    news: mpsc::Receiver<Progress>,
     stop: Arc<AtomicBool>,
-    reports: mpsc::Receiver<Report>,
-}
-
-enum Report {
-    Progress(Progress),
-    Over(JobResult),
+    outcome: Pending<JobResult>,
 }
 
 impl Job {
@@ -139,7 +135,7 @@ impl Job {
         task: Task,
         solver: Solver,
         context: Arc<Context>,
-        wake: impl Fn() + Send + 'static,
+        wake: impl Fn() + Clone + Send + 'static,
     ) -> Result<Self, String> {
         let title = match &task {
             Task::Open(path) | Task::OpenTwinned(path, _) => {
@@ -149,56 +145,28 @@ impl Job {
             Task::Edit(scene, _) => format!("Placing {}", scene.name),
         };
         let stop = Arc::new(AtomicBool::new(false));
-        let (sender, reports) = mpsc::channel();
-        let flag = Arc::clone(&stop);
+        let (sender, news) = mpsc::channel();
+        let (flag, tell) = (Arc::clone(&stop), wake.clone());
         let work = move || {
             let mut progress = |progress| {
                 // A window that is gone needs no news.
-                let _ = sender.send(Report::Progress(progress));
-                wake();
+                let _ = sender.send(progress);
+                tell();
             };
-            let outcome = match run(task, &solver, &context, &flag, &mut progress) {
+            match run(task, &solver, &context, &flag, &mut progress) {
                 Ok(loaded) => JobResult::Loaded(Box::new(loaded)),
                 Err(error) if error.kind() == ErrorKind::Stopped => JobResult::Cancelled,
                 Err(error) => JobResult::Failed(remedied(&error.to_string(), ON_THE_CPU)),
-            };
-            let _ = sender.send(Report::Over(outcome));
-            wake();
+            }
         };
-        spawn("bake", work)?;
-        let progress = Progress::default();
-        Ok(Self { title, progress, stop, reports })
+        let outcome = Pending::begin("bake", work, wake)?;
+        Ok(Self { title, progress: Progress::default(), news, stop, outcome })
     }
 
     /// Takes the news; answers with the outcome once it is over.
     pub fn poll(&mut self) -> Option<JobResult> {
-        loop {
-            match self.reports.try_recv() {
-                Ok(Report::Progress(progress)) => self.progress = progress,
-                Ok(Report::Over(outcome)) => return Some(outcome),
-                Err(mpsc::TryRecvError::Empty) => return None,
-                Err(mpsc::TryRecvError::Disconnected) => {
-                    return Some(JobResult::Failed(ENDED.into()));
-                }
-            }
-        }
-    }
-
-    /// Waits until it is over.
-    #[must_use]
-    pub fn wait(mut self) -> JobResult {
-        loop {
-            if let Some(outcome) = self.poll() {
-                return outcome;
-            }
-            thread::sleep(std::time::Duration::from_millis(2));
-        }
-    }
-
-    /// Returns how far it has come.
-    #[must_use]
-    pub fn progress(&self) -> Progress {
-        self.progress
+        self.progress = self.news.try_iter().last().unwrap_or(self.progress);
+        Some(self.outcome.poll()?.unwrap_or_else(JobResult::Failed))
     }
 
     /// Asks it to end soon.
@@ -289,15 +257,23 @@ mod tests {
     use super::*;
     use crate::{object::Object, scene::Placement, scene::Shape};
 
+    /// How `task` ends on `solver`.
+    fn done(task: Task, solver: Solver, context: &Arc<Context>) -> JobResult {
+        let (wake, woken) = mpsc::channel();
+        let mut job = Job::begin(task, solver, Arc::clone(context), move || {
+            let _ = wake.send(());
+        })
+        .unwrap();
+        woken.iter().find_map(|()| job.poll()).unwrap()
+    }
+
     #[test]
     fn an_adapter_that_does_not_answer_is_told_with_what_to_do() {
         let context = Arc::new(Context::open(AdapterChoice::Any).unwrap());
         let scene = Scene::parse(include_str!("../../tests/scenes/sphere.toml"), "sphere.toml").unwrap();
         let gone = AdapterSummary { name: "Unplugged (1)".into(), ..context.adapter().clone() };
         let task = Task::Bake(Arc::new(scene), None);
-        let JobResult::Failed(why) =
-            Job::begin(task, Solver::Adapter(gone), Arc::clone(&context), || ()).unwrap().wait()
-        else {
+        let JobResult::Failed(why) = done(task, Solver::Adapter(gone), &context) else {
             panic!("an adapter that is not there baked")
         };
         assert!(why.contains("Unplugged") && why.contains(&context.adapter().name), "{why}");
@@ -312,10 +288,7 @@ mod tests {
         let file = "gone.obj".into();
         scene.object.shape = Shape::Mesh { file, placement: Placement::METRES, refine: None };
         scene.grid.axes.iter_mut().for_each(|axis| axis.count = 2);
-        let bake = |surface| {
-            let task = Task::Bake(Arc::new(scene.clone()), surface);
-            Job::begin(task, Solver::Cpu, Arc::clone(&context), || ()).unwrap().wait()
-        };
+        let bake = |surface| done(Task::Bake(Arc::new(scene.clone()), surface), Solver::Cpu, &context);
         assert!(matches!(bake(Some(surface)), JobResult::Loaded(_)));
         assert!(matches!(bake(None), JobResult::Failed(why) if why.contains("gone.obj")));
     }

@@ -7,7 +7,7 @@ use crate::{
     scene::LinkShape,
 };
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat4, DVec3};
 
 /// A corner of a flat triangle.
 #[repr(C)]
@@ -85,14 +85,7 @@ impl Links {
 }
 
 fn columns(frame: DAffine3) -> [f32; 16] {
-    let [x, y, z] = frame.matrix3.to_cols_array_2d();
-    let mut columns = [0.0; 16];
-    for (column, (vector, last)) in
-        [(x, 0.0), (y, 0.0), (z, 0.0), (frame.translation.to_array(), 1.0)].iter().enumerate()
-    {
-        vector.iter().chain([last]).enumerate().for_each(|(row, number)| columns[4 * column + row] = *number as f32);
-    }
-    columns
+    DMat4::from(frame).as_mat4().to_cols_array()
 }
 
 /// A buffer that holds `contents`, of whole words. wgpu's own way to make one panics where the device is lost.

@@ -70,8 +70,8 @@ pub use theme::LEAST_WINDOW;
 pub use window::open;
 
 use crate::{
-    Error,
-    gpu::{ADAPTER_VARIABLE, GpuError},
+    Error, error,
+    gpu::GpuError,
     memory,
     sweep::{OTHER_ADAPTER, remedied},
 };
@@ -91,57 +91,26 @@ pub enum ViewError {
     /// The device that draws.
     #[error("{}", remedied(&.0.to_string(), OTHER_ADAPTER))]
     Gpu(#[source] GpuError),
-    /// There is nothing to draw on.
-    #[error(
-        "the window needs a Vulkan, Metal or DX12 adapter to draw on, a software one will do; found: {0}. Install \
-         your GPU's Vulkan driver or Mesa's software Vulkan (package mesa-vulkan-drivers); haptize play and haptize \
-         info need neither"
-    )]
-    NoAdapter(String),
-    /// It was lost, and the window with it.
-    #[error(
-        "the GPU that draws the window was lost, and the window with it: {0}. Start haptize view again; if this comes \
-         back, update the GPU's driver, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its name; \
-         haptize doctor lists them"
-    )]
-    Lost(String),
-    /// The object's frame update.
+    /// All else.
     #[error(transparent)]
-    Frame(#[from] Error),
-    /// Nothing answers where a desktop would.
-    #[error(
-        "there is no display to open a window on: start haptize in a desktop session, or draw one picture without a \
-         display by haptize view --screenshot FILE.png"
-    )]
-    NoDisplay,
-    /// There is a display, but no window to be had.
-    #[error("no window can be opened: {0}. haptize view --screenshot FILE.png draws one picture without a window")]
-    Window(String),
-    /// The windowing system gave up: most often the display is gone.
-    #[error(
-        "the window ended unexpectedly: {0}. Start haptize view again; if the display was there all the time, please \
-         report this with the output of haptize doctor"
-    )]
-    Ended(String),
-    /// The file cannot be opened.
-    #[error("{0}")]
-    Open(String),
-    /// The picture cannot be written.
-    #[error("cannot write {}: {reason}; choose another folder or free some space", path.display())]
-    Write {
-        /// The file.
-        path: std::path::PathBuf,
-        /// Why.
-        reason: String,
-    },
+    Other(#[from] Error),
 }
 
 impl From<GpuError> for ViewError {
     fn from(error: GpuError) -> Self {
-        match error {
-            GpuError::NoAdapter { found, .. } => Self::NoAdapter(found + &memory::scarcity()),
-            error => Self::Gpu(error),
-        }
+        let GpuError::NoAdapter { found, .. } = error else { return Self::Gpu(error) };
+        let scarcity = memory::scarcity();
+        Self::Other(error!(
+            "the window needs a Vulkan, Metal or DX12 adapter to draw on, a software one will do; found: \
+             {found}{scarcity}. Install your GPU's Vulkan driver or Mesa's software Vulkan (package \
+             mesa-vulkan-drivers); haptize play and haptize info need neither"
+        ))
+    }
+}
+
+impl From<String> for ViewError {
+    fn from(message: String) -> Self {
+        Self::Other(message.into())
     }
 }
 

@@ -4,9 +4,11 @@
 use super::{
     Start, TickSource, ViewError, Viewer, dress,
     film::{Film, PERIOD},
+    pipelines::{FORMAT, target},
     pixels, theme,
 };
 use crate::{
+    Error,
     dataset::replace_file,
     draw::canvas::encode_png,
     gpu::{AdapterChoice, Context, GpuError},
@@ -54,7 +56,7 @@ const SETTLING: usize = 3;
 /// When the device refuses it.
 pub fn render_state(context: &Context) -> Result<RenderState, ViewError> {
     let (instance, adapter, device, queue) = context.shared();
-    let target_format = super::pipelines::FORMAT;
+    let target_format = FORMAT;
     let renderer = context.scoped(|device| Renderer::new(device, target_format, RendererOptions::PREDICTABLE))?;
     Ok(RenderState {
         available_adapters: vec![adapter.clone()],
@@ -87,9 +89,9 @@ impl Stage {
         viewer.start(start, &egui);
         viewer.wait();
         if let Some(error) = viewer.error() {
-            return Err(ViewError::Open(error.to_owned()));
+            return Err(error.to_owned().into());
         }
-        viewer.begin_motion(picture.motion.as_deref()).map_err(ViewError::Open)?;
+        viewer.begin_motion(picture.motion.as_deref())?;
         Ok(Self { context, render, egui, viewer })
     }
 }
@@ -101,17 +103,17 @@ impl Stage {
 /// When there is no device, `start` cannot be opened or has no motion, or the film not be written.
 pub fn video(start: &Start, picture: &Picture, path: &Path) -> Result<usize, ViewError> {
     let Stage { egui, mut viewer, .. } = Stage::new(start, picture)?;
-    let none = || ViewError::Open("there is no motion to show: give the scene one, or take a picture".into());
+    let none = || Error::from("there is no motion to show: give the scene one, or take a picture");
     let (_, duration) = viewer.time_in_motion().ok_or_else(none)?;
-    let mut film = Film::begin(path.to_owned(), || ()).map_err(ViewError::Open)?;
+    let mut film = Film::begin(path.to_owned(), || ())?;
     let stills = (duration / PERIOD).round() as usize;
     for _ in 0..stills {
         viewer.advance(PERIOD, &egui);
         let size = picture.size.map(|side| side as u32);
         film.take(viewer.picture(size, &egui.style_of(egui.theme()).visuals)?);
     }
-    let written = film.end().wait().map_err(ViewError::Open)?;
-    written.map(|_| stills).map_err(ViewError::Frame)
+    film.end().wait()??;
+    Ok(stills)
 }
 
 /// Opens `start`, plays until the picture's instant, and writes the window as it is then to the PNG file `path`.
@@ -146,7 +148,8 @@ pub fn screenshot(start: &Start, picture: &Picture, path: &Path) -> Result<(), V
 pub(super) fn write_picture(path: &Path, size: [u32; 2], bytes: &[u8]) -> Result<(), ViewError> {
     let written =
         replace_file(path, |file| encode_png(file, size, png::ColorType::Rgba, bytes).map_err(io::Error::other));
-    written.map_err(|error| ViewError::Write { path: path.to_owned(), reason: error.to_string() })
+    let remedy = "choose another folder or free some space";
+    written.map_err(|error| format!("cannot write {}: {error}; {remedy}", path.display()).into())
 }
 
 /// Paints a frame of egui and reads it back: size and bytes of red, green, blue, opacity.
@@ -167,16 +170,7 @@ fn paint(
                 renderer.update_texture(device, &render.queue, id, &image);
             }
         }
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("window"),
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: render.target_format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let texture = target(device, "window", size, render.target_format, 1, wgpu::TextureUsages::COPY_SRC);
         let view = texture.create_view(&Default::default());
         let mut encoder = device.create_command_encoder(&Default::default());
         let mut commands = renderer.update_buffers(device, &render.queue, &mut encoder, &triangles, &screen);

@@ -88,8 +88,8 @@ fn scale(ui: &Ui, painter: &Painter, rect: Rect, palette: &Palette, camera: &Cam
 /// Draws the key of the surface's colours.
 fn colours(ui: &Ui, painter: &Painter, rect: Rect, body: &Body, quantity: Quantity) {
     let (title, top) = match quantity {
-        Quantity::Displacement => ("displacement [mm]", 1e3 * body.extremes[0]),
-        Quantity::Force => ("contact force [N]", body.extremes[1]),
+        Quantity::Displacement => ("displacement [mm]", 1e3 * body.most(quantity)),
+        Quantity::Force => ("contact force [N]", body.most(quantity)),
     };
     let (small, text) = (theme::small(), ui.visuals().text_color());
     let bar = bar(rect);

@@ -3,11 +3,11 @@
 use super::{
     app::{Viewer, not_drawn},
     feel::TickSource,
+    files::Files,
     guide::Guide,
     job::{Job, Task, short},
     lead::Lead,
     loaded::Loaded,
-    notice::Notice,
     number,
     plots::{self, Plots},
     session::Session,
@@ -85,11 +85,11 @@ impl Viewer {
         }
         for (key, side) in [(Key::Num1, Side::Front), (Key::Num2, Side::Right), (Key::Num3, Side::Top)] {
             if asks(Modifiers::NONE, key) {
-                self.scene.look_from(side);
+                self.scene.steering.look_from(side);
             }
         }
         if asks(Modifiers::NONE, Key::Num5) {
-            self.scene.reset_view();
+            self.scene.steering.reset();
         }
         let Some(session) = &self.session else { return };
         if asks(Modifiers::NONE, Key::Num4) {
@@ -127,14 +127,14 @@ impl Viewer {
     fn views(&mut self, ui: &mut Ui) {
         for (name, side) in [("Front", Side::Front), ("Right", Side::Right), ("Top", Side::Top)] {
             if ui.button(name).clicked() {
-                self.scene.look_from(side);
+                self.scene.steering.look_from(side);
             }
         }
         if let (true, Some(session)) = (ui.button("Fit object and tip").clicked(), &self.session) {
             self.scene.fit(&session.loaded);
         }
         if ui.button("Reset").on_hover_text("Or double-click the scene").clicked() {
-            self.scene.reset_view();
+            self.scene.steering.reset();
         }
         ui.separator();
         let where_to = "Into the folder that Open… shows";
@@ -227,11 +227,11 @@ impl Viewer {
             ui.label(RichText::new(what).small());
             return;
         }
-        let jitter = session.history.jitter().percentiles();
-        let cost = session.history.cost().percentiles();
+        let jitter = session.history.jitter.percentiles();
+        let cost = session.history.cost.percentiles();
         if cost.count > 0 && self.pace == TickSource::Clock {
             let words = format!("tick {} µs, jitter {} µs at 99 %", number(cost.p50), number(jitter.p99));
-            let refused = session.history.refused();
+            let refused = &session.history.refused;
             ui.separator();
             let label = ui.label(RichText::new(words).small());
             if !refused.is_empty() {
@@ -251,7 +251,7 @@ impl Viewer {
         let narrow = size.x < NARROW;
         let mut written = None;
         if narrow {
-            written = plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+            written = plots_panel(ui, side, below, &mut self.plots, session, &self.files);
         }
         Panel::left("controls")
             .frame(side)
@@ -275,7 +275,7 @@ impl Viewer {
             session.configuration_space(ui, &q);
         });
         if !narrow {
-            written = plots_panel(ui, side, below, &mut self.plots, session, self.files.folder());
+            written = plots_panel(ui, side, below, &mut self.plots, session, &self.files);
         }
         let shows_steps = &mut self.shows_steps;
         CentralPanel::no_frame().show(ui, |ui| {
@@ -288,18 +288,13 @@ impl Viewer {
             }
         });
         self.solver = session.controls.solver.clone();
-        match written {
-            Some(Ok(text)) => self.notice = Some(Notice::new(text)),
-            Some(Err(error)) => self.error = Some(error),
-            None => {}
-        }
-        let Some(scene) = session.controls.scene.clone() else { return };
-        if let Some(edit) = edit {
-            self.begin(Task::Edit(scene, edit), &ui.ctx().clone());
-        } else if bake {
-            let surface = session.loaded.dataset.surface.clone();
-            self.begin(Task::Bake(scene, surface), &ui.ctx().clone());
-        }
+        let task = match (session.controls.scene.clone(), edit) {
+            (Some(scene), Some(edit)) => Some(Task::Edit(scene, edit)),
+            (Some(scene), None) if bake => Some(Task::Bake(scene, session.loaded.dataset.surface.clone())),
+            _ => None,
+        };
+        written.into_iter().for_each(|written| self.told(written));
+        task.into_iter().for_each(|task| self.begin(task, ui.ctx()));
     }
 
     /// Shows the progress of what is being opened, before there is anything to feel.
@@ -310,13 +305,9 @@ impl Viewer {
             match &self.job {
                 Some(job) => {
                     ui.heading(&job.title);
-                    ui.label(
-                        RichText::new(
-                            "Contact is solved at every point of the grid over the joints, once; \
-                             then it is felt at 1 kHz.",
-                        )
-                        .weak(),
-                    );
+                    let what =
+                        "Contact is solved at every point of the grid over the joints, once; then it is felt at 1 kHz.";
+                    ui.label(RichText::new(what).weak());
                     ui.add_space(GROUP_GAP);
                     let size = vec2(WIDE_PROGRESS + LONE_BUTTON.x, LONE_BUTTON.y);
                     ui.allocate_ui(size, |ui| ui.horizontal(|ui| progress(ui, job, WIDE_PROGRESS)));
@@ -370,14 +361,11 @@ impl Viewer {
             }
             _ => return,
         };
-        match saved {
-            Ok(file) => {
-                self.is_unsaved = false;
-                self.notice = Some(Notice::new(format!("wrote {}", file.display())));
-                self.files.remember(&file);
-            }
-            Err(error) => self.error = Some(error),
+        if let Ok(file) = &saved {
+            self.is_unsaved = false;
+            self.files.remember(file);
         }
+        self.told(saved.map(|file| format!("wrote {}", file.display())));
     }
 }
 
@@ -411,10 +399,10 @@ fn plots_panel(
     height: f32,
     plots: &mut Plots,
     session: &mut Session,
-    folder: &Path,
+    files: &Files,
 ) -> Option<Result<String, String>> {
     let panel = Panel::bottom("plots").frame(frame).resizable(true).default_size(height);
-    let asked = panel.show(ui, |ui| plots.show(ui, &session.loaded, &mut session.history, folder)).inner;
+    let asked = panel.show(ui, |ui| plots.show(ui, &session.loaded, &mut session.history, files)).inner;
     if asked.hold_still {
         session.history.hold_still(&mut session.feel);
     }
@@ -472,7 +460,7 @@ fn motions(ui: &mut Ui, guide: &mut Guide) {
 }
 
 fn progress(ui: &mut Ui, job: &Job, width: f32) {
-    let done = job.progress();
+    let done = job.progress;
     let share = if done.points > 0 { done.done as f32 / done.points as f32 } else { 0.0 };
     let text = if done.points == 0 {
         "preparing".to_owned()
@@ -481,15 +469,11 @@ fn progress(ui: &mut Ui, job: &Job, width: f32) {
     } else {
         format!("{} of {}", done.done, done.points)
     };
-    let cancel = |ui: &mut Ui| {
-        if ui.button("Cancel").clicked() {
-            job.cancel();
-        }
-    };
-    let bar =
-        ProgressBar::new(share).desired_width(width).desired_height(PROGRESS_HEIGHT).text(RichText::new(text).small());
-    ui.add(bar);
-    cancel(ui);
+    let bar = ProgressBar::new(share).desired_width(width).desired_height(PROGRESS_HEIGHT);
+    ui.add(bar.text(RichText::new(text).small()));
+    if ui.button("Cancel").clicked() {
+        job.cancel();
+    }
 }
 
 /// Why there is no torque, if there is none.
@@ -516,7 +500,7 @@ fn felt(ui: &mut Ui, session: &mut Session, touched: Option<usize>) {
     let Some(tick) = session.history.last() else { return };
     let mut contact = contact(tick, touched);
     let held = tick.flags.contains(Flags::HELD);
-    let began_inside = tick.sample.contact && !session.history.was_free();
+    let began_inside = tick.sample.contact && !session.history.was_free;
     if began_inside {
         contact += " since the session began: with the closest surface, from whichever side the arm came";
     }

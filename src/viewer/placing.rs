@@ -45,8 +45,6 @@ pub struct ObjectPlace {
 const LENGTH_DRAG: f64 = 0.5;
 const ANGLE_DRAG: f64 = 0.5;
 
-const AXES: [&str; 3] = ["x", "y", "z"];
-
 impl ObjectPlace {
     /// Of what is open; none where that is no scene, or has no object to be moved.
     #[must_use]
@@ -81,34 +79,22 @@ impl ObjectPlace {
     /// Shows the fields, with the arm at `q`; answers with a change that is to be made.
     pub fn show(&mut self, ui: &mut Ui, q: &JointVector) -> Option<Edit> {
         let mut done = false;
-        ui.label(RichText::new("Object at [mm]").small());
-        ui.horizontal(|ui| {
-            for (k, axis) in AXES.into_iter().enumerate() {
-                let mut place = 1e3 * (self.centre[k] + self.motion[k]);
-                let number = DragValue::new(&mut place).speed(LENGTH_DRAG).max_decimals(1);
-                let label = ui.label(axis);
-                let response = ui.add(number).labelled_by(label.id);
-                let response = response.on_hover_text("Or drag the object in the picture with Ctrl held");
+        let places = 1e3 * (self.centre + self.motion);
+        for (k, (place, response)) in numbers(ui, "Object at [mm]", places, LENGTH_DRAG).into_iter().enumerate() {
+            let response = response.on_hover_text("Or drag the object in the picture with Ctrl held");
+            if response.changed() {
+                self.motion[k] = 1e-3 * place - self.centre[k];
+            }
+            done |= is_done(&response);
+        }
+        if self.turn.is_some() {
+            let angles = self.turned.map(f64::to_degrees);
+            for (k, (angle, response)) in numbers(ui, "Turned about [°]", angles, ANGLE_DRAG).into_iter().enumerate() {
                 if response.changed() {
-                    self.motion[k] = 1e-3 * place - self.centre[k];
+                    self.turned[k] = angle.to_radians();
                 }
                 done |= is_done(&response);
             }
-        });
-        if self.turn.is_some() {
-            ui.label(RichText::new("Turned about [°]").small());
-            ui.horizontal(|ui| {
-                for (k, axis) in AXES.into_iter().enumerate() {
-                    let mut angle = self.turned[k].to_degrees();
-                    let label = ui.label(axis);
-                    let number = DragValue::new(&mut angle).speed(ANGLE_DRAG).max_decimals(1);
-                    let response = ui.add(number).labelled_by(label.id);
-                    if response.changed() {
-                        self.turned[k] = angle.to_radians();
-                    }
-                    done |= is_done(&response);
-                }
-            });
         }
         let bring = ui.button("Bring it to the tip").on_hover_text("Moves the object before the tip of the arm");
         let pose = ui.button("Use this pose").on_hover_text("A grid, a press and a scrape where the tip is now");
@@ -120,6 +106,19 @@ impl ObjectPlace {
             () => None,
         }
     }
+}
+
+/// Shows three numbers, each after the name of its axis, that change by `speed` for each point of the pointer's way.
+fn numbers(ui: &mut Ui, title: &str, numbers: DVec3, speed: f64) -> [(f64, Response); 3] {
+    ui.label(RichText::new(title).small());
+    let row = ui.horizontal(|ui| {
+        [("x", numbers.x), ("y", numbers.y), ("z", numbers.z)].map(|(axis, mut number)| {
+            let label = ui.label(axis);
+            let response = ui.add(DragValue::new(&mut number).speed(speed).max_decimals(1)).labelled_by(label.id);
+            (number, response)
+        })
+    });
+    row.inner
 }
 
 /// Whether a number is as it is to be: a drag has ended, or typing.

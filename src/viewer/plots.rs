@@ -2,7 +2,7 @@
 //! zoom, and can be written as CSV and as the figures that `haptize play` draws.
 
 use super::{
-    files::fresh,
+    files::Files,
     history::History,
     legend,
     loaded::Loaded,
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     Error, JointVector,
-    dataset::replace_file,
+    dataset::{Axis, replace_file},
     draw::canvas::Canvas,
     render::{
         timing::{Durations, Percentiles},
@@ -21,7 +21,7 @@ use crate::{
 };
 use eframe::egui::{self, Button, RichText, Ui, vec2};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The quantity that is plotted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -95,8 +95,8 @@ impl Plots {
         self.frozen = None;
     }
 
-    /// The panel in all of `ui`; `folder` is where files go.
-    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, folder: &Path) -> Asked {
+    /// The panel in all of `ui`; `files` knows where exports go.
+    pub fn show(&mut self, ui: &mut Ui, loaded: &Loaded, history: &mut History, files: &Files) -> Asked {
         let mut asked = Asked::default();
         ui.horizontal_wrapped(|ui| {
             for (tab, name, what) in [
@@ -118,10 +118,10 @@ impl Plots {
                 self.span(ui);
             }
             if ui.button("CSV").on_hover_text("Export all ticks kept, the last twenty seconds").clicked() {
-                asked.written = Some(self.write_csv(loaded, history, folder));
+                asked.written = Some(self.write_csv(loaded, history, files));
             }
             if ui.button("PNG").on_hover_text("Export the figures that haptize play draws").clicked() {
-                asked.written = Some(self.write_png(loaded, history, folder).map_err(|error| error.to_string()));
+                asked.written = Some(self.write_png(loaded, history, files).map_err(|error| error.to_string()));
             }
             if self.tab == Tab::Timing {
                 if ui.button("Reset").clicked() {
@@ -129,14 +129,21 @@ impl Plots {
                 }
                 let why = "The window holds still for two seconds while the loop goes on: the jitter that is left is \
                            the machine's own, what is more is the window's";
-                let clocked = history.cost().percentiles().count > 0;
+                let clocked = history.cost.percentiles().count > 0;
                 asked.hold_still = ui.add_enabled(clocked, Button::new("Hold still")).on_hover_text(why).clicked();
             }
         });
         let shown = self.frozen.as_ref().unwrap_or(history);
         match self.tab {
-            Tab::Torque => self.torque(ui, loaded, shown),
-            Tab::Configuration => self.configuration(ui, loaded, shown),
+            Tab::Torque => {
+                let pair: [(_, OfTick); 2] =
+                    [("contact", |tick| &tick.sample.torque), ("device", |tick| &tick.device_torque)];
+                self.joints(ui, loaded, shown, true, pair);
+            }
+            Tab::Configuration => {
+                let pair: [(_, OfTick); 2] = [("proxy", |tick| &tick.proxy), ("device", |tick| &tick.device)];
+                self.joints(ui, loaded, shown, false, pair);
+            }
             Tab::Contacts => self.contacts(ui, loaded, shown),
             Tab::Energy => self.energy(ui, loaded, shown),
             Tab::Timing => timing(ui, shown),
@@ -147,67 +154,43 @@ impl Plots {
     /// Lets the user choose how long the time axis is.
     fn span(&mut self, ui: &mut Ui) {
         let label = ui.label("Last");
-        let span = egui::ComboBox::from_id_salt("span").width(SPAN_WIDTH).selected_text(format!("{} s", self.seconds));
-        let choices = span.show_ui(ui, |ui| {
+        legend::choice(ui, &label, "span", Some(SPAN_WIDTH), format!("{} s", self.seconds), |ui| {
             for seconds in SPANS {
                 ui.selectable_value(&mut self.seconds, seconds, format!("{seconds} s"));
             }
         });
-        choices.response.labelled_by(label.id);
     }
 
-    fn torque(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
+    /// Draws a plot for each unit of efforts or of coordinates, one below the other, with two lines for each joint: their
+    /// names and the vectors whose entry they show. The second is compared with the first.
+    fn joints(&self, ui: &mut Ui, loaded: &Loaded, history: &History, is_effort: bool, pair: [(&str, OfTick); 2]) {
         let axes = &loaded.dataset.grid.axes;
-        let groups = theme::by_unit(axes.iter().map(|axis| axis.effort_unit().to_owned()));
-        let get = |of: fn(&Tick) -> &JointVector, joint| Box::new(move |tick: &Tick| of(tick)[joint]) as Get;
-        self.groups(ui, groups, |ui, unit, joints| {
-            let lines = joints.iter().flat_map(|&joint| {
-                let name = &axes[joint].name;
-                [
-                    (format!("{name} contact"), joint, false, get(|tick| &tick.sample.torque, joint)),
-                    (format!("{name} device"), joint, true, get(|tick| &tick.device_torque, joint)),
-                ]
-            });
-            let what = if unit == "N" { "force" } else { "torque" };
-            self.lines(ui, history, &format!("{what} [{unit}]"), lines.collect(), &[]);
-        });
-    }
-
-    fn configuration(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
-        let axes = &loaded.dataset.grid.axes;
-        let groups = theme::by_unit(axes.iter().map(|axis| axis.unit.clone()));
-        let get = |of: fn(&Tick) -> &JointVector, joint| Box::new(move |tick: &Tick| of(tick)[joint]) as Get;
-        self.groups(ui, groups, |ui, unit, joints| {
-            let lines = joints.iter().flat_map(|&joint| {
-                let name = &axes[joint].name;
-                [
-                    (format!("{name} proxy"), joint, false, get(|tick| &tick.proxy, joint)),
-                    (format!("{name} device"), joint, true, get(|tick| &tick.device, joint)),
-                ]
-            });
-            self.lines(ui, history, &format!("q [{unit}]"), lines.collect(), &[]);
-        });
-    }
-
-    /// Draws a plot for each unit, one below the other.
-    fn groups(&self, ui: &mut Ui, groups: Vec<(String, Vec<usize>)>, draw: impl Fn(&mut Ui, &str, &[usize])) {
+        let unit = |axis: &Axis| if is_effort { axis.effort_unit().to_owned() } else { axis.unit.clone() };
+        let groups = theme::by_unit(axes.iter().map(unit));
         let between = ui.spacing().item_spacing.y;
         for (number, (unit, joints)) in groups.iter().enumerate() {
             let left = (groups.len() - number) as f32;
             let height = (ui.available_height() - (left - 1.0) * between) / left;
-            ui.allocate_ui(vec2(ui.available_width(), height), |ui| ui.vertical(|ui| draw(ui, unit, joints)));
+            let lines = joints.iter().flat_map(|&joint| {
+                [0, 1].map(|k| {
+                    let (name, of) = pair[k];
+                    series(&format!("{} {name}", axes[joint].name), joint, k == 1, move |tick| of(tick)[joint])
+                })
+            });
+            let what = match (is_effort, unit.as_str()) {
+                (false, _) => "q",
+                (true, "N") => "force",
+                (true, _) => "torque",
+            };
+            ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+                ui.vertical(|ui| self.lines(ui, history, &format!("{what} [{unit}]"), lines.collect(), &[]));
+            });
         }
     }
 
     fn contacts(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
-        let nodes = (
-            "object nodes in contact".to_owned(),
-            0,
-            false,
-            Box::new(|tick: &Tick| f64::from(tick.sample.contact_nodes)) as Get,
-        );
-        let index = ("contact index × 10".to_owned(), 1, true, Box::new(|tick: &Tick| 10.0 * tick.sample.index) as Get);
-        let mut lines = vec![index];
+        let nodes = series("object nodes in contact", 0, false, |tick| tick.sample.contact_nodes.into());
+        let mut lines = vec![series("contact index × 10", 1, true, |tick| 10.0 * tick.sample.index)];
         if loaded.knows_nodes() {
             lines.insert(0, nodes);
         } else {
@@ -217,9 +200,8 @@ impl Plots {
     }
 
     fn energy(&self, ui: &mut Ui, loaded: &Loaded, history: &History) {
-        let account = |name: &str, number, get: fn(&Tick) -> f64| {
-            (name.to_owned(), number, false, Box::new(move |tick: &Tick| 1e3 * get(tick)) as Get)
-        };
+        let account =
+            |name: &str, number, get: fn(&Tick) -> f64| series(name, number, false, move |tick| 1e3 * get(tick));
         let mut accounts = vec![
             account("absorbed by proxy and coupling", 1, |tick| tick.accounts.absorbed()),
             account("proxy's damping", 2, |tick| tick.accounts.proxy_dissipation),
@@ -229,23 +211,14 @@ impl Plots {
             accounts.insert(0, account("stored in the object", 0, |tick| tick.accounts.stored));
             accounts.push(account("made by time step and interpolation", 5, |tick| tick.accounts.leak));
         } else {
-            absent(
-                ui,
-                "The object's energy is not stored: what it holds and what time step and interpolation make is not known.",
-            );
+            let what = "The object's energy is not stored: what it holds and what time step and interpolation make is not known.";
+            absent(ui, what);
         }
         self.lines(ui, history, "energy [mJ]", accounts, &[]);
     }
 
     /// Draws `lines` over time; the axis up has the values `always`, and spans [`LEAST_SPAN`] at least.
-    fn lines(
-        &self,
-        ui: &mut Ui,
-        history: &History,
-        label: &str,
-        lines: Vec<(String, usize, bool, Get<'_>)>,
-        always: &[f64],
-    ) {
+    fn lines(&self, ui: &mut Ui, history: &History, label: &str, lines: Vec<Series<'_>>, always: &[f64]) {
         let dark = ui.visuals().dark_mode;
         names(ui, label, &lines);
         let end = history.last().map_or(0.0, |tick| tick.time);
@@ -283,8 +256,8 @@ impl Plots {
         });
     }
 
-    fn write_csv(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, String> {
-        let file = fresh(folder, "viewer-trace", "csv");
+    fn write_csv(&self, loaded: &Loaded, history: &History, files: &Files) -> Result<String, String> {
+        let file = files.fresh("viewer-trace", "csv");
         let trace = self.frozen.as_ref().unwrap_or(history).trace(loaded);
         replace_file(&file, |out| trace.write_ticks(out)).map_err(|error| {
             format!("cannot write {}: {error}; free some space or start haptize elsewhere", file.display())
@@ -292,18 +265,18 @@ impl Plots {
         Ok(format!("wrote {}", file.display()))
     }
 
-    fn write_png(&self, loaded: &Loaded, history: &History, folder: &Path) -> Result<String, Error> {
+    fn write_png(&self, loaded: &Loaded, history: &History, files: &Files) -> Result<String, Error> {
         let history = self.frozen.as_ref().unwrap_or(history);
         let trace = history.trace(loaded);
         let write = |name: &str, canvas: &Canvas| {
-            let file = fresh(folder, name, "png");
-            report::write_png(folder, &file.file_stem().unwrap_or_default().to_string_lossy(), canvas)
+            let file = files.fresh(name, "png");
+            report::write_png(files.folder(), &file.file_stem().unwrap_or_default().to_string_lossy(), canvas)
         };
         let mut files: Vec<PathBuf> = vec![
             write("viewer-press", &report::press::press(&trace))?,
             write("viewer-energy", &report::press::energy(&trace))?,
         ];
-        if history.jitter().percentiles().count > 0 {
+        if history.jitter.percentiles().count > 0 {
             files.push(write("viewer-jitter", &report::jitter::jitter(&history.timing()))?);
         }
         let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
@@ -320,11 +293,18 @@ fn absent(ui: &mut Ui, what: &str) {
     ui.label(RichText::new(what).weak().small());
 }
 
-/// A number of a tick.
-type Get<'a> = Box<dyn Fn(&Tick) -> f64 + 'a>;
+/// A vector of a tick.
+type OfTick = fn(&Tick) -> &JointVector;
+
+/// A line: its name, the number of its colour, whether others are compared with it, and a number of a tick.
+type Series<'a> = (String, usize, bool, Box<dyn Fn(&Tick) -> f64 + 'a>);
+
+fn series<'a>(name: &str, number: usize, is_behind: bool, get: impl Fn(&Tick) -> f64 + 'a) -> Series<'a> {
+    (name.to_owned(), number, is_behind, Box::new(get))
+}
 
 /// Shows quantity and names of the lines above their plot: beside it, a short plot leaves no room for its axis' name.
-fn names(ui: &mut Ui, label: &str, lines: &[(String, usize, bool, Get<'_>)]) {
+fn names(ui: &mut Ui, label: &str, lines: &[Series<'_>]) {
     let dark = ui.visuals().dark_mode;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = GAP;
@@ -361,13 +341,13 @@ fn timing(ui: &mut Ui, history: &History) {
     let dark = ui.visuals().dark_mode;
     let size = vec2(0.5 * (ui.available_width() - GROUP_GAP), ui.available_height());
     ui.horizontal_top(|ui| {
-        for (number, title, durations) in [(0, "jitter", history.jitter()), (1, "cost of a tick", history.cost())] {
+        for (number, title, durations) in [(0, "jitter", &history.jitter), (1, "cost of a tick", &history.cost)] {
             ui.allocate_ui(size, |ui| {
                 ui.vertical(|ui| {
                     let words = shares(durations).unwrap_or_else(|| "nothing measured, the loop runs by steps".into());
                     ui.label(RichText::new(format!("{title} [µs]: {words}")).small());
                     if number == 0 {
-                        let words = shares(history.still()).unwrap_or_else(|| "not measured yet".into());
+                        let words = shares(&history.still).unwrap_or_else(|| "not measured yet".into());
                         ui.label(RichText::new(format!("the window holding still: {words}")).weak().small());
                     }
                     let bars: Vec<Bar> = durations
@@ -380,26 +360,16 @@ fn timing(ui: &mut Ui, history: &History) {
                         })
                         .collect();
                     let chart = BarChart::new(title, bars).color(palette::series(number, dark)).allow_hover(false);
-                    let decade = |mark: egui_plot::GridMark, _: &std::ops::RangeInclusive<f64>| {
-                        if (mark.value - mark.value.round()).abs() < 1e-9 {
-                            number_of(10.0_f64.powf(mark.value))
-                        } else {
-                            String::new()
-                        }
-                    };
-                    let ticks = |mark: egui_plot::GridMark, _: &std::ops::RangeInclusive<f64>| {
-                        let power = mark.value - 1.0;
-                        let whole = power >= 0.0 && (power - power.round()).abs() < 1e-9;
-                        if whole { number_of(10.0_f64.powf(power)) } else { String::new() }
-                    };
                     plot(ui, ("timing", number), &format!("{title} [µs]"), "ticks")
                         .y_grid_spacer(egui_plot::log_grid_spacer(10))
                         .default_x_bounds(DECADES[0], DECADES[1])
                         .include_y(0.0)
                         .include_x(DECADES[0])
                         .include_x(DECADES[1])
-                        .custom_x_axes(vec![theme::across(&format!("{title} [µs]")).formatter(decade)])
-                        .custom_y_axes(vec![theme::upward("ticks").formatter(ticks)])
+                        .custom_x_axes(vec![
+                            theme::across(&format!("{title} [µs]")).formatter(|mark, _| power_of_ten(mark.value)),
+                        ])
+                        .custom_y_axes(vec![theme::upward("ticks").formatter(|mark, _| count(mark.value))])
                         .show(ui, |plot| {
                             plot.bar_chart(chart);
                         });
@@ -416,6 +386,16 @@ fn shares(durations: &Durations) -> Option<String> {
     (count > 0).then(|| format!("median {p50}, 99 % {p99}, 99.9 % {p999}, most {max}"))
 }
 
-fn number_of(value: f64) -> String {
-    if value >= 1.0 { format!("{value:.0}") } else { number(value) }
+/// Ten to the power of `power`, where that is whole.
+fn power_of_ten(power: f64) -> String {
+    match 10.0_f64.powf(power) {
+        _ if (power - power.round()).abs() >= 1e-9 => String::new(),
+        value if value >= 1.0 => format!("{value:.0}"),
+        value => number(value),
+    }
+}
+
+/// The count whose bar is `height` high.
+fn count(height: f64) -> String {
+    if height >= 1.0 { power_of_ten(height - 1.0) } else { String::new() }
 }

@@ -2,7 +2,7 @@
 //! the vertex that was clicked.
 
 use super::{probe::Probe, theme};
-use crate::{dataset::Axis, draw::ticks, render::trace::Tick};
+use crate::{dataset::Axis, draw::ticks::number as plain, render::trace::Tick};
 use eframe::egui::{RichText, Ui};
 use glam::DVec3;
 
@@ -60,11 +60,6 @@ impl Readout<'_> {
             force(ui, "  force", acting);
         }
     }
-}
-
-/// `value` with `decimals`, and no minus before a zero.
-fn plain(value: f64, decimals: usize) -> String {
-    ticks::number(value, decimals)
 }
 
 fn three(vector: DVec3, decimals: usize) -> String {

@@ -16,7 +16,7 @@ use super::{
     probe::pick,
     readout::Readout,
     shapes::Shape,
-    steering::{Side, Steering},
+    steering::Steering,
     theme::{FINE_GAP, GROUP_GAP},
     view_renderer::{Look, Quantity, ViewRenderer},
 };
@@ -57,7 +57,8 @@ pub struct SceneView {
     render: RenderState,
     stage: ViewRenderer,
     texture: Option<(egui::TextureId, [usize; 2])>,
-    steering: Steering,
+    /// Whence it is seen.
+    pub steering: Steering,
     body: Option<Body>,
     /// Shapes of the arm's links, where it has any.
     links: Option<Links>,
@@ -168,7 +169,7 @@ impl SceneView {
     ) -> Result<(), ViewError> {
         let (context, loaded) = (Arc::clone(&self.context), loaded.clone());
         let set_up = move |effects: &GraphicsEffects| Body::new(&context, &loaded, effects);
-        if let Some(body) = self.redrawing.follow(effects, "object", set_up, wake).map_err(ViewError::Open)? {
+        if let Some(body) = self.redrawing.follow(effects, "object", set_up, wake)? {
             self.body = body?;
         }
         Ok(())
@@ -178,19 +179,6 @@ impl SceneView {
     #[must_use]
     pub fn is_redrawing(&self) -> bool {
         self.redrawing.is_busy()
-    }
-
-    /// Waits until the object is drawn with `effects`; for pictures and tests.
-    ///
-    /// # Errors
-    /// As [`SceneView::follow`].
-    pub fn wait(&mut self, loaded: &Loaded, effects: &GraphicsEffects) -> Result<(), ViewError> {
-        self.follow(loaded, effects, || ())?;
-        while let Some(body) = self.redrawing.wait().map_err(ViewError::Open)? {
-            self.body = body?;
-            self.follow(loaded, effects, || ())?;
-        }
-        Ok(())
     }
 
     /// Lets `elapsed` (s) go by with the loop at `latest`.
@@ -285,16 +273,6 @@ impl SceneView {
         self.placement.as_ref().map_or(DAffine3::IDENTITY, ObjectPlace::frame)
     }
 
-    /// Looks from where one looked first.
-    pub fn reset_view(&mut self) {
-        self.steering.reset();
-    }
-
-    /// Looks from `side`.
-    pub fn look_from(&mut self, side: Side) {
-        self.steering.look_from(side);
-    }
-
     /// Sees the object of `loaded` and the tip of the arm whole, and no more.
     pub fn fit(&mut self, loaded: &Loaded) {
         let object = loaded.setup.object.iter().flat_map(|object| &object.rest).copied();
@@ -339,11 +317,7 @@ impl SceneView {
         chain: &Chain,
     ) -> Result<egui::TextureId, GpuError> {
         let size = [rect.width(), rect.height()].map(|side| (side * pixels_per_point).round().max(1.0) as u32);
-        let extremes = self.body.as_ref().map_or([0.0; 2], |body| body.extremes);
-        let top = match self.shown.quantity {
-            Quantity::Displacement => extremes[0],
-            Quantity::Force => extremes[1],
-        };
+        let top = self.body.as_ref().map_or(0.0, |body| body.most(self.shown.quantity));
         let look = Look {
             background: figure_colour(palette.stage).channels(),
             quantity: self.shown.quantity,
@@ -404,7 +378,7 @@ impl SceneView {
             shapes.extend(bare.iter().map(|cone| Shape::from(cone).unlit()));
         }
         if let Some(body) = &self.body {
-            let (longest, colour) = (body.extremes[1].max(f64::MIN_POSITIVE), figure_colour(palette.force));
+            let (longest, colour) = (body.most(Quantity::Force).max(f64::MIN_POSITIVE), figure_colour(palette.force));
             for (node, force) in body.contacts() {
                 // The shapes' own places are those of the node at rest: the GPU moves them with it.
                 let rest = body.rest(node).as_dvec3();

@@ -119,19 +119,6 @@ impl Session {
         made.map_or(Ok(()), |made| self.go_on(made))
     }
 
-    /// Waits until the loop has gains and effects of the controls; for pictures and tests.
-    ///
-    /// # Errors
-    /// As [`Session::follow`].
-    pub fn wait(&mut self) -> Result<(), String> {
-        self.follow(|| ())?;
-        while let Some(made) = self.retuning.wait()? {
-            self.go_on(made)?;
-            self.follow(|| ())?;
-        }
-        Ok(())
-    }
-
     /// Plays motion `number` from its beginning, where hand and proxy are put: for pictures, which have no past.
     ///
     /// # Errors
@@ -167,7 +154,17 @@ mod tests {
         scene::{Interpolation, Scene},
         sweep::baked,
     };
-    use std::sync::mpsc;
+    use std::{sync::mpsc, thread, time::Duration};
+
+    /// Follows the controls until the loop has their gains.
+    fn settle(session: &mut Session) -> Result<(), String> {
+        session.follow(|| ())?;
+        while session.is_retuning() {
+            thread::sleep(Duration::from_millis(1));
+            session.follow(|| ())?;
+        }
+        Ok(())
+    }
 
     #[test]
     fn what_is_felt_stays_until_another_loop_is_made() {
@@ -194,8 +191,7 @@ mod tests {
         let last = session.history.last().unwrap().time;
         assert!((last - 0.029).abs() < 1e-9, "{last}");
         open.send(()).unwrap();
-        session.wait().unwrap();
-        assert!(!session.is_retuning());
+        settle(&mut session).unwrap();
         session.feel.step(10);
         session.history.collect(&mut session.feel);
         // Its time goes on where the last one's ended.
@@ -204,8 +200,8 @@ mod tests {
         // What does not make a loop is reported once, and the last one goes on.
         session.controls.tuning.haptics.boundary_slope[0] = -1.0;
         session.controls.tuning.haptics.interpolation = Interpolation::Linear;
-        assert!(session.wait().unwrap_err().contains("slope"));
-        session.wait().unwrap();
+        assert!(settle(&mut session).unwrap_err().contains("slope"));
+        settle(&mut session).unwrap();
         session.feel.step(1);
     }
 }

@@ -21,8 +21,8 @@ use crate::{
     draw::colour::ColourMap,
 };
 use eframe::egui::{
-    self, ColorImage, ComboBox, Painter, Rect, RichText, ScrollArea, Slider, Stroke, StrokeKind, TextureHandle,
-    TextureOptions, Ui, pos2, vec2,
+    self, ColorImage, Painter, Rect, RichText, ScrollArea, Slider, Stroke, StrokeKind, TextureHandle, TextureOptions,
+    Ui, pos2, vec2,
 };
 use egui_plot::{HoverPosition, Line, MarkerShape, Plot, PlotImage, PlotPoint, Points};
 
@@ -103,16 +103,11 @@ impl Slices {
         let grid = &dataset.grid;
         ui.horizontal(|ui| {
             let label = ui.label("Show");
-            ComboBox::from_id_salt("column")
-                .width(COLUMN_WIDTH)
-                .selected_text(self.column.name(grid))
-                .show_ui(ui, |ui| {
-                    for column in Column::all(dataset) {
-                        ui.selectable_value(&mut self.column, column, column.name(grid));
-                    }
-                })
-                .response
-                .labelled_by(label.id);
+            legend::choice(ui, &label, "column", Some(COLUMN_WIDTH), self.column.name(grid), |ui| {
+                for column in Column::all(dataset) {
+                    ui.selectable_value(&mut self.column, column, column.name(grid));
+                }
+            });
         });
         if grid.joints() < 2 {
             return;
@@ -122,16 +117,11 @@ impl Slices {
                 let label = ui.label(name);
                 let chosen = &grid.axes[self.axes[side]].name;
                 let mut axis = self.axes[side];
-                ComboBox::from_id_salt(name)
-                    .width(JOINT_WIDTH)
-                    .selected_text(chosen)
-                    .show_ui(ui, |ui| {
-                        for (joint, of) in grid.axes.iter().enumerate() {
-                            ui.selectable_value(&mut axis, joint, &of.name);
-                        }
-                    })
-                    .response
-                    .labelled_by(label.id);
+                legend::choice(ui, &label, name, Some(JOINT_WIDTH), chosen, |ui| {
+                    for (joint, of) in grid.axes.iter().enumerate() {
+                        ui.selectable_value(&mut axis, joint, &of.name);
+                    }
+                });
                 if axis != self.axes[side] {
                     // Choosing the other side's joint swaps the two.
                     if axis == self.axes[1 - side] {

@@ -151,13 +151,7 @@ pub fn small() -> FontId {
 /// The unit of several quantities: `N m`, or each once where they differ.
 #[must_use]
 pub fn units(all: impl Iterator<Item = String>) -> String {
-    let mut units: Vec<String> = Vec::new();
-    for unit in all {
-        if !units.contains(&unit) {
-            units.push(unit);
-        }
-    }
-    units.join(" or ")
+    by_unit(all).into_iter().map(|(unit, _)| unit).collect::<Vec<_>>().join(" or ")
 }
 
 /// Returns the joints of each unit, in the order in which units first occur: quantities of different units share no

@@ -3,7 +3,7 @@
 
 use super::{
     links::{DrawnLinks, filled},
-    pipelines::{self, DEPTH, FORMAT, View, bind},
+    pipelines::{self, DEPTH, FORMAT, View, bind, target},
     shapes::{Shape, unit_shape},
 };
 use crate::{
@@ -248,18 +248,7 @@ fn cast(view: View, (height, [red, green, blue]): (f32, [f32; 3])) -> View {
 impl Targets {
     fn new(context: &Context, size: [u32; 2], samples: u32) -> Result<Self, GpuError> {
         context.scoped(|device| {
-            let texture = |label, format, sample_count, usage| {
-                device.create_texture(&wgpu::TextureDescriptor {
-                    label: Some(label),
-                    size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                    mip_level_count: 1,
-                    sample_count,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                    view_formats: &[],
-                })
-            };
+            let texture = |label, format, samples, usage| target(device, label, size, format, samples, usage);
             let none = wgpu::TextureUsages::empty();
             let shown = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
             Self {

@@ -3,7 +3,7 @@
 use super::{DeviceChoice, Start, TickSource, ViewError, Viewer, dress, theme};
 use crate::{
     Error,
-    gpu::{AdapterChoice, Context, GpuError},
+    gpu::{ADAPTER_VARIABLE, AdapterChoice, Context, GpuError},
     threads::spawn,
 };
 use eframe::{
@@ -78,13 +78,28 @@ pub fn open(start: Start, device: Option<DeviceChoice>) -> Result<(), ViewError>
     let shown = catch_unwind(AssertUnwindSafe(|| eframe::run_native("haptize", options, create)));
     // Once it has nothing to do any more, a lost device says so.
     let _ = context.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(LAST_WORK) });
-    match (context.check(), shown) {
-        (Err(GpuError::Lost(why)), _) => Err(ViewError::Lost(why)),
-        (_, Ok(Ok(()))) => Ok(()),
-        (_, Ok(Err(eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_)))) => Err(ViewError::NoDisplay),
-        (_, Ok(Err(other))) => Err(ViewError::Window(other.to_string())),
-        (_, Err(panic)) => Err(ViewError::Ended(words(panic.as_ref()).to_owned())),
+    Err(match (context.check(), shown) {
+        (Err(GpuError::Lost(why)), _) => format!(
+            "the GPU that draws the window was lost, and the window with it: {why}. Start haptize view again; if this \
+             comes back, update the GPU's driver, or draw on another adapter: set {ADAPTER_VARIABLE} to a part of its \
+             name; haptize doctor lists them"
+        ),
+        (_, Ok(Ok(()))) => return Ok(()),
+        (_, Ok(Err(eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_)))) => {
+            "there is no display to open a window on: start haptize in a desktop session, or draw one picture without a \
+             display by haptize view --screenshot FILE.png"
+                .to_owned()
+        }
+        (_, Ok(Err(other))) => format!(
+            "no window can be opened: {other}. haptize view --screenshot FILE.png draws one picture without a window"
+        ),
+        (_, Err(panic)) => format!(
+            "the window ended unexpectedly: {}. Start haptize view again; if the display was there all the time, please \
+             report this with the output of haptize doctor",
+            words(panic.as_ref())
+        ),
     }
+    .into())
 }
 
 /// Closes the window of `egui` when `stop` is raised, until what is returned is dropped.

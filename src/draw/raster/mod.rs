@@ -13,15 +13,6 @@ use glam::DVec3;
 /// Samples a pixel along each side.
 const SAMPLES: usize = 3;
 
-/// How a surface answers light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Finish {
-    /// Lit, with a faint highlight.
-    Solid,
-    /// Colour as given: lines and marks.
-    Flat,
-}
-
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertex {
@@ -113,7 +104,7 @@ impl Raster {
     }
 
     /// A triangle. One with a corner behind the camera or not a number is left out: the camera stands outside.
-    pub fn triangle(&mut self, corners: [Vertex; 3], finish: Finish) {
+    pub fn triangle(&mut self, corners: [Vertex; 3]) {
         let [Some(a), Some(b), Some(c)] = corners.map(|corner| self.project(corner.position)) else { return };
         let area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
         // A triangle seen edge-on covers no sample.
@@ -144,7 +135,7 @@ impl Raster {
                     normal += *weight * corner.normal;
                     colour.iter_mut().zip(corner_colour).for_each(|(sum, part)| *sum += *weight as f32 * part);
                 }
-                self.light[sample] = self.lit(colour, normal.normalize_or_zero(), finish);
+                self.light[sample] = self.lit(colour, normal.normalize_or_zero());
             }
         }
     }
@@ -167,7 +158,7 @@ impl Raster {
                 let towards = rest.sqrt();
                 let nearness = middle.nearness / (1.0 - towards * radius * middle.nearness);
                 let Some(sample) = self.nearer(column, row, nearness) else { continue };
-                self.light[sample] = self.lit(colour, x * axes[0] - y * axes[1] + towards * axes[2], Finish::Solid);
+                self.light[sample] = self.lit(colour, x * axes[0] - y * axes[1] + towards * axes[2]);
             }
         }
     }
@@ -255,11 +246,8 @@ impl Raster {
         None
     }
 
-    /// Light that leaves a surface towards the camera.
-    fn lit(&self, colour: [f32; 3], normal: DVec3, finish: Finish) -> [f32; 3] {
-        if finish == Finish::Flat {
-            return colour;
-        }
+    /// Light that leaves a surface towards the camera, with a faint highlight.
+    fn lit(&self, colour: [f32; 3], normal: DVec3) -> [f32; 3] {
         let towards = self.axes[2];
         // Closed bodies only: a normal that points away belongs to a surface interpolated across its rim.
         let away = normal.dot(towards).min(0.0);
@@ -342,17 +330,16 @@ mod tests {
         let mut raster =
             Raster::new(Viewpoint::framing(&[DVec3::splat(-1.0), DVec3::splat(1.0)], -DVec3::Y, [120, 120]));
         let [v, w] = [DVec3::new(-2.0, -1.0, -1.0), DVec3::new(2.0, -1.0, -1.0)];
-        raster.triangle(flat(RED, [v, w, DVec3::new(0.0, 3.0, 3.0)]), Finish::Flat);
-        raster.triangle(
-            flat(INK, [DVec3::new(-2.0, 0.5, -1.0), DVec3::new(2.0, 0.5, -1.0), DVec3::new(0.0, 0.5, 3.0)]),
-            Finish::Flat,
-        );
+        raster.triangle(flat(RED, [v, w, DVec3::new(0.0, 3.0, 3.0)]));
+        raster
+            .triangle(flat(INK, [DVec3::new(-2.0, 0.5, -1.0), DVec3::new(2.0, 0.5, -1.0), DVec3::new(0.0, 0.5, 3.0)]));
         let picture = raster.picture();
-        for (z, nearer) in [(0.45, RED), (0.55, INK)] {
+        for (z, is_red) in [(0.45, true), (0.55, false)] {
             // The red plane is y = z; the dark one y = 0.5.
             let front = DVec3::new(0.0, f64::min(z, 0.5), z);
             let at = raster.view().project(front).unwrap();
-            assert_eq!(pixel(&picture, at), nearer.rgb, "height {z}");
+            let [red, _, blue] = pixel(&picture, at);
+            assert_eq!(red > blue, is_red, "height {z}");
         }
     }
 
@@ -365,7 +352,7 @@ mod tests {
             raster.sphere(point, 0.1, RED);
             raster.line([point, DVec3::ZERO], 2.0, INK, 0.0);
             let vertex = |position| Vertex { position, normal: DVec3::Z, colour: RED };
-            raster.triangle([vertex(point), vertex(DVec3::ZERO), vertex(DVec3::X)], Finish::Solid);
+            raster.triangle([vertex(point), vertex(DVec3::ZERO), vertex(DVec3::X)]);
         }
         raster.sphere(DVec3::ZERO, f64::NAN, RED);
         assert!(raster.picture().pixels.iter().all(|&pixel| pixel == WHITE.rgb));

@@ -1,6 +1,6 @@
 //! Bodies of revolution and meshes, made of triangles.
 
-use super::{Finish, Raster, Vertex};
+use super::{Raster, Vertex};
 use crate::draw::{colour::Colour, solid::Cone};
 use glam::DVec3;
 
@@ -28,7 +28,7 @@ impl Raster {
                 let node = node as usize;
                 Vertex { position: nodes[node], normal: normals[node].normalize_or_zero(), colour: colours[node] }
             });
-            self.triangle(corners, Finish::Solid);
+            self.triangle(corners);
         }
     }
 
@@ -39,7 +39,7 @@ impl Raster {
             let [Some(&a), Some(&b), Some(&c)] = triangle.map(|node| nodes.get(node as usize)) else { continue };
             let normal = (b - a).cross(c - a).normalize_or_zero();
             let normal = if normal.dot(towards) < 0.0 { -normal } else { normal };
-            self.triangle([a, b, c].map(|position| Vertex { position, normal, colour }), Finish::Solid);
+            self.triangle([a, b, c].map(|position| Vertex { position, normal, colour }));
         }
     }
 
@@ -95,8 +95,8 @@ impl Raster {
         };
         for index in 0..FACETS {
             let quad = [corner(index, 0), corner(index + 1, 0), corner(index + 1, 1), corner(index, 1)];
-            self.triangle([quad[0], quad[1], quad[2]], Finish::Solid);
-            self.triangle([quad[0], quad[2], quad[3]], Finish::Solid);
+            self.triangle([quad[0], quad[1], quad[2]]);
+            self.triangle([quad[0], quad[2], quad[3]]);
         }
     }
 
@@ -106,7 +106,7 @@ impl Raster {
         let vertex = |position: DVec3| Vertex { position, normal, colour };
         for index in 0..FACETS {
             let rim = |index: usize| vertex(centre + radius * ring[index % FACETS]);
-            self.triangle([vertex(centre), rim(index), rim(index + 1)], Finish::Solid);
+            self.triangle([vertex(centre), rim(index), rim(index + 1)]);
         }
     }
 }

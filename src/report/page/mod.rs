@@ -8,7 +8,7 @@
 mod pack;
 
 use super::{
-    object::{FORCE, Instant, LINK, LINK_THICKNESS, PROXY_NODE, links, view},
+    object::{Extent, FORCE, Instant, LINK, LINK_THICKNESS, PROXY_NODE, links, view},
     slices::{Plane, torque_size},
 };
 use crate::{
@@ -89,8 +89,8 @@ impl Body {
     pub fn new(surface: &Surface, chain: Chain, scene: &str, instants: Vec<Instant>) -> Option<Self> {
         let is_shown = !instants.is_empty();
         is_shown.then(|| Self {
-            rest: surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect(),
-            triangles: surface.triangles.as_chunks().0.to_vec(),
+            rest: surface.places().collect(),
+            triangles: surface.facets().to_vec(),
             chain,
             shapes: links(scene),
             instants,
@@ -114,13 +114,7 @@ impl Body {
 
     fn packed(&self, pack: &mut Pack) -> Value {
         let Self { rest, triangles, chain, shapes, instants } = self;
-        let (low, high) =
-            rest.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &n| (low.min(n), high.max(n)));
-        let radius = (high - low).length() / 2.0;
-        let displacements = instants.iter().flat_map(|instant| rest.iter().zip(&instant.nodes));
-        let largest = displacements.map(|(n0, n)| n.distance(*n0)).filter(|u| u.is_finite()).fold(0.0, f64::max);
-        let forces = || instants.iter().flat_map(|instant| &instant.forces);
-        let greatest_force = forces().map(|at| at.force.length()).filter(|f| f.is_finite()).fold(0.0, f64::max);
+        let Extent { middle, radius, displacement: largest, force } = Extent::of(rest, instants);
         let unit = if largest > 0.0 { largest / STEPS } else { 1.0 };
 
         let mut before = vec![0_i16; 3 * rest.len()];
@@ -162,7 +156,7 @@ impl Body {
         json!({
             "rest": pack.put_f32(flat(rest)),
             "triangles": pack.put(triangles.as_flattened()),
-            "view": view((low + high) / 2.0, instants, forces().map(|at| at.force).sum()).to_array(),
+            "view": view(middle, instants).to_array(),
             "times": instants.iter().map(|instant| instant.time).collect::<Vec<_>>(),
             "unit": unit,
             "largest": largest,
@@ -173,8 +167,8 @@ impl Body {
             "kinds": pack.put(&rods.iter().map(|(cone, _)| u8::from(cone.colour == PROXY_NODE)).collect::<Vec<_>>()),
             "poses": pack.put_f32(poses),
             "links": links,
-            "force": greatest_force,
-            "forces": pack.put_f32(forces().flat_map(of_force)),
+            "force": force,
+            "forces": pack.put_f32(instants.iter().flat_map(|instant| &instant.forces).flat_map(of_force)),
             "counts": instants.iter().map(|instant| instant.forces.len()).collect::<Vec<_>>(),
             "touching": instants.iter().map(|instant| instant.contact_nodes).collect::<Vec<_>>(),
         })
@@ -342,7 +336,7 @@ impl<'a> Page<'a> {
 fn at_rest(surface: &Surface, chain: &Chain, q: &[f64], forces: Vec<NodeForce>) -> Instant {
     let mut pose = chain.new_pose();
     chain.pose(q, &mut pose);
-    let nodes = surface.nodes.chunks_exact(3).map(DVec3::from_slice).collect();
+    let nodes = surface.places().collect();
     Instant { time: 0.0, nodes, contact_nodes: forces.len() as u32, forces, pose }
 }
 

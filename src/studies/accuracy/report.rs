@@ -7,8 +7,8 @@ use crate::{
     draw::{
         canvas::Canvas,
         colour,
-        diagram::{Diagram, Series},
-        plot::{Entry, Mark},
+        diagram::Diagram,
+        plot::{Curve, Entry, Mark},
     },
     report::{write, write_both},
     scene::ContactLaw,
@@ -67,24 +67,21 @@ fn csv(accuracy: &Accuracy) -> io::Result<Vec<u8>> {
 }
 
 /// A curve for each series of `study`, in the order of the rows.
-fn curves(accuracy: &Accuracy, study: Study, place: fn(&Row) -> (f64, f64)) -> Vec<Series> {
-    let mut curves: Vec<Series> = Vec::new();
+fn curves(accuracy: &Accuracy, study: Study, place: fn(&Row) -> (f64, f64)) -> Vec<Curve> {
+    let mut curves: Vec<Curve> = Vec::new();
     for row in accuracy.of(study) {
         match curves.iter_mut().find(|curve| curve.name == row.series) {
             Some(curve) => curve.points.push(place(row)),
-            None => {
-                let (name, colour) = (row.series.clone(), curves.len());
-                curves.push(Series { name, points: vec![place(row)], dashed: false, colour });
-            }
+            None => curves.push(Curve::new(&row.series, curves.len(), [place(row)])),
         }
     }
     curves
 }
 
 /// Draws both panels of a sheet, each with its title, and all curves in the legend, in colours of their own.
-fn pair(sheet: &mut Diagram, up: &str, mut panels: [(String, Vec<Series>); 2]) {
+fn pair(sheet: &mut Diagram, up: &str, mut panels: [(String, Vec<Curve>); 2]) {
     let all = panels.iter_mut().flat_map(|(_, curves)| curves);
-    all.enumerate().for_each(|(colour, curve)| curve.colour = colour);
+    all.enumerate().for_each(|(number, curve)| curve.colour = colour::series(number));
     for (number, (across, curves)) in panels.iter().enumerate() {
         sheet.panel(number, across, up, curves, &[]);
     }
@@ -105,7 +102,7 @@ fn spacing(accuracy: &Accuracy) -> Canvas {
     let with_worst = |rms, worst| {
         let worst = curves(accuracy, Study::Spacing, worst).into_iter();
         let mut all = curves(accuracy, Study::Spacing, rms);
-        all.extend(worst.map(|curve| Series { name: String::new(), dashed: true, ..curve }));
+        all.extend(worst.map(|curve| Curve { name: String::new(), dashed: true, ..curve }));
         all
     };
     let across = with_worst(|row| (row.value, row.rms), |row| (row.value, row.worst));

@@ -4,7 +4,7 @@
 use super::accuracy::{RATIOS, compliance, reference};
 use super::indentation::{INDENTERS, converged, gel, pressed};
 use super::*;
-use haptize::draw::diagram::{Diagram, Series};
+use haptize::draw::{diagram::Diagram, plot::Curve};
 use haptize::report::write_png;
 
 /// Cubes under the indenters, as small as the surface gets by itself; cubes of the block under the pressure; edges of the
@@ -115,9 +115,9 @@ impl Linear {
 #[ignore = "draws a figure in minutes: docs/solids.sh"]
 fn errors_fall_with_the_size_of_the_cubes() {
     let names = INDENTERS.map(|(name, ..)| name);
-    let mut curves: [Vec<Series>; 4] = Default::default();
-    for (colour, poisson) in RATIOS.into_iter().enumerate() {
-        let series = |name: String, points: Vec<(f64, f64)>, dashed| Series { name, points, dashed, colour };
+    let mut curves: [Vec<Curve>; 4] = Default::default();
+    for (number, poisson) in RATIOS.into_iter().enumerate() {
+        let series = |name, points: Vec<(f64, f64)>, dashed| Curve { dashed, ..Curve::new(name, number, points) };
         let percent = |found: f64, expected: f64| 100.0 * (found / expected - 1.0).abs();
         let mut points: [Vec<(f64, f64)>; 4] = Default::default();
         for cell in CUBES {
