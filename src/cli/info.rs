@@ -43,6 +43,9 @@ struct Info {
     contradiction: Option<String>,
     #[serde(flatten)]
     body: Body,
+    /// Joints that follow others, one description each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    followers: Vec<String>,
 }
 
 /// Opens and checks the file, and sums it up.
@@ -56,7 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
         ErrorKind::Foreign => format!("{error}, or a mesh whose name ends in {}", mesh_endings()).into(),
         _ => Failure::from(error),
     })?;
-    let spec = Rendering::parse(&dataset.scene, "scene").ok().and_then(|scene| scene.object);
+    let scene = Rendering::parse(&dataset.scene, "scene").ok();
+    let followers = scene.iter().flat_map(|scene| &scene.proxy.followers).map(ToString::to_string).collect();
+    let spec = scene.and_then(|scene| scene.object);
     let info = Info {
         summary: dataset.summary(),
         file: path.display().to_string(),
@@ -67,6 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<Report, Failure> {
             inclusions: inclusions(&spec),
             skin: spec.skin.and_then(|skin| skin_on(&dataset, skin)),
         }),
+        followers,
     };
     Report::of(&info, info.contradiction.is_none())
 }
@@ -147,7 +153,7 @@ fn skin_on(dataset: &Dataset, spec: SkinSpec) -> Option<Skin> {
 
 impl Describe for Info {
     fn describe(&self, text: &mut Text) {
-        let Self { summary, file, file_bytes, absent, contradiction, body } = self;
+        let Self { summary, file, file_bytes, absent, contradiction, body, followers } = self;
         let (points, size) = (summary.points, *file_bytes as f64 / 1e6);
         let state = if contradiction.is_some() { "intact" } else { "sound" };
         text.line(format_args!("{file}: {}, {size:.1} MB, {state}", counted(points, ["point", "points"])));
@@ -159,6 +165,7 @@ impl Describe for Info {
         describe_absent(text, absent);
         summary.provenance.describe(text);
         body.describe(text);
+        followers.iter().for_each(|follower| text.row("follower", follower));
     }
 }
 

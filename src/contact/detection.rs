@@ -315,6 +315,7 @@ mod tests {
     fn nodes(count: usize, radius: f64) -> Chain {
         Chain::new(&ProxySpec {
             joints: vec![JointSpec {
+                follows: None,
                 name: "joint".into(),
                 kind: JointKind::Prismatic,
                 origin: DVec3::ZERO,
@@ -326,6 +327,7 @@ mod tests {
                 rotor_inertia: 0.0,
                 nodes: vec![ProxyNodeSpec { position: DVec3::ZERO, radius, length: 0.0 }; count],
             }],
+            ..Default::default()
         })
     }
 

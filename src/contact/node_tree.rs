@@ -123,6 +123,7 @@ mod tests {
     fn arm() -> Chain {
         let mut random = Random::new(5);
         let joints = (0..3_usize).map(|link| JointSpec {
+            follows: None,
             name: format!("joint {link}"),
             kind: if link == 1 { JointKind::Prismatic } else { JointKind::Revolute },
             origin: DVec3::new(0.0, 0.05, 0.02 * link as f64),
@@ -143,7 +144,7 @@ mod tests {
                 })
                 .collect(),
         });
-        Chain::new(&ProxySpec { joints: joints.collect() })
+        Chain::new(&ProxySpec { joints: joints.collect(), ..Default::default() })
     }
 
     #[test]

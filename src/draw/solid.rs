@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn an_arm_has_a_rod_and_a_ball_a_link_and_a_ball_a_node() {
         let node = |link| Node { link, position: DVec3::ZERO, radius: 0.0, length: 0.0 };
-        let chain = Chain { joints: vec![], nodes: [0, 1, 1].map(node).to_vec() };
+        let chain = Chain { nodes: [0, 1, 1].map(node).to_vec(), ..Chain::default() };
         let nodes_at = vec![DVec3::Y, 2.0 * DVec3::X, 3.0 * DVec3::X];
         let pose = Pose { origins: vec![DVec3::ZERO, DVec3::X], nodes: nodes_at, ..Pose::default() };
         let count = |is_shown: fn(usize) -> bool| {

@@ -11,7 +11,11 @@ use super::{
     model::RestModel,
     shaders::{self, MOST_CARRIERS},
 };
-use crate::{JointVector, MAX_AXES, contact, scene::JointKind};
+use crate::{
+    JointVector, MAX_AXES, contact,
+    proxy::{Chain, Link},
+    scene::JointKind,
+};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 
@@ -71,7 +75,7 @@ pub(super) struct RestDevice {
     context: Arc<Context>,
     kernel: Kernel,
     parameters: Parameters,
-    kinds: Vec<JointKind>,
+    chain: Chain,
     section: usize,
     record: usize,
     lanes: [Lane; 2],
@@ -123,13 +127,13 @@ impl RestDevice {
             ("WHOLE", flag(model.compliance.is_whole())),
         ];
         let kernel = Kernel::new(&context, &shaders::REST, &overrides)?;
-        let record = record_length(model.chain.joints.len(), model.with_tangent);
+        let record = record_length(model.chain.links.len(), model.with_tangent);
         let section = capacity.section.clamp(1, own.section);
         let room = Room { section, rows: rows as usize, record };
         let lane = |_| Lane::new(&context, &kernel, &uploaded, room);
         let lanes = [lane(0)?, lane(1)?];
-        let kinds = model.chain.joints.iter().map(|joint| joint.kind).collect();
-        Ok(Self { context, kernel, parameters, kinds, section, record, lanes })
+        let chain = model.chain.clone();
+        Ok(Self { context, kernel, parameters, chain, section, record, lanes })
     }
 
     /// The device.
@@ -194,12 +198,14 @@ impl Device for RestDevice {
     fn submit(&mut self, lane: usize, section: &[JointVector]) {
         let lane = &mut self.lanes[lane];
         let count = section.len();
-        // (cos q, sin q) of every joint, or (q, 0) of a prismatic one: all that kinematics needs.
-        let motion = |(&kind, &q): (&JointKind, &f64)| match kind {
+        // (cos q, sin q) of every link, or (q, 0) of a prismatic one: all that kinematics needs.
+        let motion = |link: &Link, q: f64| match link.spec.kind {
             JointKind::Revolute => [q.cos() as f32, q.sin() as f32],
             JointKind::Prismatic => [q as f32, 0.0],
         };
-        let motions: Vec<[f32; 2]> = section.iter().flat_map(|q| self.kinds.iter().zip(q.iter()).map(motion)).collect();
+        let links = &self.chain.links;
+        let motions: Vec<[f32; 2]> =
+            section.iter().flat_map(|q| links.iter().map(|link| motion(link, link.coordinate(q)))).collect();
         lane.motions.write(&self.context, &motions);
         lane.parameters.write(&self.context, &[Parameters { configurations: count as u32, ..self.parameters }]);
         let records = (4 * self.record * count) as u64;

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     MAX_AXES, contact,
-    proxy::Chain,
+    proxy::{Chain, Link},
     scene::{ContactLaw, JointKind},
 };
 use glam::DVec3;
@@ -65,9 +65,9 @@ impl RestModel {
         if model.contact.round.is_some() {
             return Err(GpuError::Rounded);
         }
-        let joints = model.chain.joints.len();
-        if joints > MAX_AXES {
-            return Err(GpuError::Joints(joints));
+        let links = model.chain.links.len();
+        if links > MAX_AXES {
+            return Err(GpuError::Joints(links));
         }
         let Parts { parameters, surface, mesh } = Parts::new(model);
         let surface: Vec<[f32; 4]> = surface.into_iter().map(|row| row.map(|number| number as f32)).collect();
@@ -85,7 +85,7 @@ impl RestModel {
 
 /// Returns what a gap in f32 may be off by (m).
 pub(super) fn gap_band(model: &contact::Model<'_>) -> f64 {
-    let joints = model.chain.joints.len() as f64;
+    let joints = model.chain.links.len() as f64;
     GPU_GAP_BAND_PER_EXTENT * model.surface.extent
         + GPU_GAP_BAND_PER_JOINT * joints * reach(model.chain, model.surface.centre)
 }
@@ -135,7 +135,7 @@ impl Parts {
         let (low, inverse_side, counts) = bounds.lattice();
         let parameters = Parameters {
             configurations: 0,
-            joints: model.chain.joints.len() as u32,
+            joints: model.chain.links.len() as u32,
             proxy_nodes: model.chain.nodes.len() as u32,
             surface_nodes: object.surface_nodes as u32,
             triangles,
@@ -183,14 +183,11 @@ fn sphere_around(points: &[DVec3], slack: f64) -> [f64; 4] {
 /// Distance from the object's centre that no proxy node ever exceeds (m).
 fn reach(chain: &Chain, centre: DVec3) -> f64 {
     let mut length = 0.0;
-    let lengths: Vec<f64> = (chain.joints.iter().enumerate())
-        .map(|(k, joint)| {
-            let slide = match joint.kind {
-                JointKind::Revolute => 0.0,
-                JointKind::Prismatic => joint.limits[0].abs().max(joint.limits[1].abs()),
-            };
-            let origin = if k == 0 { joint.origin - centre } else { joint.origin };
-            length += origin.length() + slide;
+    let limits: Vec<[f64; 2]> = chain.joints.iter().map(|joint| joint.limits).collect();
+    let lengths: Vec<f64> = (chain.links.iter().enumerate())
+        .map(|(k, link)| {
+            let origin = if k == 0 { link.spec.origin - centre } else { link.spec.origin };
+            length += origin.length() + link.slide(&limits);
             length
         })
         .collect();
@@ -201,7 +198,7 @@ fn reach(chain: &Chain, centre: DVec3) -> f64 {
 /// share of stiffness of each proxy node.
 fn chain(model: &contact::Model<'_>) -> Vec<f32> {
     let mut numbers = Vec::new();
-    for (k, joint) in model.chain.joints.iter().enumerate() {
+    for (k, Link { spec: joint, .. }) in model.chain.links.iter().enumerate() {
         let origin = if k == 0 { joint.origin - model.surface.centre } else { joint.origin };
         numbers.extend(origin.to_array());
         numbers.extend(joint.axis.to_array());

@@ -121,7 +121,7 @@ impl Backend for GpuSolver<'_> {
     fn stream(&mut self, work: &mut dyn Work) -> Result<(), GpuError> {
         let Self { devices, model, cpu, left_to_cpu, .. } = self;
         solve_together(devices, work, |section, Found { records, touches }| {
-            let each = record_length(model.chain.joints.len(), model.with_tangent);
+            let each = record_length(model.chain.links.len(), model.with_tangent);
             let results: Vec<_> = section.iter().zip(records.chunks_exact(each)).collect();
             cpu.map(&results, |solver, (q, record)| {
                 unpack(model, q, record, &touches).unwrap_or_else(|| {

@@ -28,7 +28,7 @@ pub(super) fn unpack(
     let &[status, iterations, count, first, gap, energy, residual] = record.first_chunk()?;
     let [gap, energy, residual] = [gap, energy, residual].map(number);
     let status = Status::from_number(u8::try_from(status).ok()?)?;
-    let joints = q.len();
+    let (joints, links) = (q.len(), model.chain.links.len());
     if gap.is_nan() || gap.abs() <= gap_band(model) {
         return None;
     }
@@ -38,16 +38,17 @@ pub(super) fn unpack(
         _ => return None,
     }
     let numbers: Vec<f64> =
-        record.get(7..record_length(joints, model.with_tangent))?.iter().map(|it| number(*it)).collect();
-    let (torque, tangent) = numbers.split_at_checked(joints)?;
-    let torque = JointVector::from_slice(torque);
+        record.get(7..record_length(links, model.with_tangent))?.iter().map(|it| number(*it)).collect();
+    // The kernel's joints are all links.
+    let (torque, tangent) = numbers.split_at_checked(links)?;
+    let torque = model.chain.joint_torque(torque);
     let mut equilibrium =
         Equilibrium { status, iterations, residual, energy, torque, ..Equilibrium::free(gap, joints) };
     if model.with_tangent {
         let mut matrix = JointMatrix::default();
-        let places = (0..joints).flat_map(|k| (0..=k).map(move |l| (k, l)));
+        let places = (0..links).flat_map(|k| (0..=k).map(move |l| (k, l)));
         places.zip(tangent).for_each(|((k, l), entry)| add_symmetric(&mut matrix, k, l, *entry));
-        equilibrium.tangent = Some(matrix);
+        equilibrium.tangent = Some(model.chain.joint_matrix(&matrix));
     }
     let mut parts = Vec::new();
     for words in touches.get(first as usize..)?.get(..count as usize)? {

@@ -1,14 +1,17 @@
 //! The chain and its forward kinematics.
 
+use super::Link;
 use crate::JointVector;
 use crate::scene::{JointSpec, ProxyNodeSpec, ProxySpec};
 use glam::{DMat3, DVec3};
 
 /// A serial chain.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Chain {
-    /// From the base outwards.
+    /// Those that move independently, from the base outwards: a configuration has one coordinate for each.
     pub joints: Vec<JointSpec>,
+    /// All joints, those that follow others included, from the base outwards.
+    pub links: Vec<Link>,
     /// Contact nodes of all links, link by link.
     pub nodes: Vec<Node>,
 }
@@ -16,7 +19,7 @@ pub struct Chain {
 /// A contact node x_i.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    /// The joint whose link carries it.
+    /// The link that carries it.
     pub link: usize,
     /// In the link's frame (m).
     pub position: DVec3,
@@ -43,19 +46,21 @@ impl Chain {
     /// The chain of a validated scene.
     #[must_use]
     pub fn new(spec: &ProxySpec) -> Self {
-        let nodes = spec.joints.iter().enumerate().flat_map(|(link, joint)| {
+        let links: Vec<Link> = spec.links().into_iter().map(|(joint, spec)| Link::new(joint, spec)).collect();
+        let nodes = links.iter().enumerate().flat_map(|(link, joint)| {
             let node = move |node: &ProxyNodeSpec| Node {
                 link,
                 position: node.position,
                 radius: node.radius,
                 length: node.length,
             };
-            joint.nodes.iter().map(node)
+            joint.spec.nodes.iter().map(node)
         });
-        Self { joints: spec.joints.clone(), nodes: nodes.collect() }
+        let nodes = nodes.collect();
+        Self { joints: spec.joints.clone(), links, nodes }
     }
 
-    /// Number of joints d.
+    /// Number of coordinates d.
     #[must_use]
     pub fn degrees_of_freedom(&self) -> usize {
         self.joints.len()
@@ -69,13 +74,13 @@ impl Chain {
         pose
     }
 
-    /// Places the chain at configuration `q`, one number per joint; missing ones count as zero. Allocates only where
+    /// Places the chain at configuration `q`, one number per independent joint; missing ones count as zero. Allocates only where
     /// `pose` does not have the chain's size yet.
     pub fn pose(&self, q: &[f64], pose: &mut Pose) {
-        let joints = self.joints.len();
-        pose.origins.resize(joints, DVec3::ZERO);
-        pose.rotations.resize(joints, DMat3::IDENTITY);
-        pose.axes.resize(joints, DVec3::ZERO);
+        let links = self.links.len();
+        pose.origins.resize(links, DVec3::ZERO);
+        pose.rotations.resize(links, DMat3::IDENTITY);
+        pose.axes.resize(links, DVec3::ZERO);
         pose.nodes.resize(self.nodes.len(), DVec3::ZERO);
 
         let links = self.links(q);
@@ -97,7 +102,7 @@ impl Chain {
 mod tests {
     use super::super::random;
     use super::*;
-    use crate::scene::JointKind;
+    use crate::scene::{Follows, JointKind};
 
     #[test]
     fn a_pose_is_reused_without_leaving_a_trace() {
@@ -140,12 +145,19 @@ mod tests {
             inertia: DMat3::ZERO,
             rotor_inertia: 1.0,
             nodes: Vec::new(),
+            follows: None,
         };
-        let tip = Node { link: 1, position: DVec3::new(0.3, 0.0, 0.0), radius: 0.0, length: 0.0 };
-        let chain = Chain { joints: vec![joint(0.0), joint(0.5)], nodes: vec![tip] };
+        let mut joints = vec![joint(0.0), joint(0.5)];
+        joints[1].nodes = vec![ProxyNodeSpec { position: DVec3::new(0.3, 0.0, 0.0), radius: 0.0, length: 0.0 }];
+        let chain = Chain::new(&ProxySpec::new(joints.clone()).unwrap());
         let (a, b) = (0.4_f64, 1.1_f64);
         let pose = random::at(&chain, &[a, b], &[0.0, 0.0], 0.0);
         let expected = DVec3::new(0.5 * a.cos() + 0.3 * (a + b).cos(), 0.5 * a.sin() + 0.3 * (a + b).sin(), 0.0);
         assert!(pose.nodes[0].distance(expected) < 1e-15);
+        // The second joint as the first one's follower: one coordinate moves both.
+        joints[0].name = "first".into();
+        joints[1].follows = Some(Follows { joint: "first".into(), multiplier: 1.0, offset: b - a });
+        let chain = Chain::new(&ProxySpec::new(joints).unwrap());
+        assert_eq!(random::at(&chain, &[a], &[0.0], 0.0).nodes, pose.nodes);
     }
 }

@@ -8,12 +8,14 @@
 //! `dM_ij/dq_k = 0` for k <= i, `(s_i x s_k) . I_j s_j` for i < k <= j,
 //! `(s_i x s_k) . I_k s_j + (s_j x s_k) . I_k s_i` for j < k.
 //!
+//! This is over all links; the matrices over the joints are gathered from it, for how joints move links is linear.
+//!
 //! The Christoffel matrix is `C_ij = 1/2 sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) v_k`: its symmetric part is half
 //! of `Mdot`, its skew part `1/2 (W - W^T)` with `W_ij = sum_k dM_ik/dq_j v_k`.
 
-use super::{Chain, Links};
+use super::{Chain, Link, Links};
 use crate::scene::JointKind;
-use crate::{JointMatrix, JointVector, MAX_JOINTS};
+use crate::{JointMatrix, MAX_JOINTS};
 use glam::{DMat3, DVec3};
 
 /// M and its change at one configuration and one velocity.
@@ -70,8 +72,8 @@ impl Chain {
     /// M at `q` and its change at velocity `v`, one number per joint each. Allocates nothing.
     #[must_use]
     pub fn dynamics(&self, q: &[f64], v: &[f64]) -> Dynamics {
-        let joints = self.joints.len().min(MAX_JOINTS);
-        let v = JointVector::from_slice(v).padded();
+        let joints = self.links.len().min(MAX_JOINTS);
+        let v = self.link_rates(v).padded();
         let links = self.links(q);
         let twists = self.twists(&links);
         let composite = self.composite_inertias(&links);
@@ -98,7 +100,7 @@ impl Chain {
                 }
                 rate[j][i] = rate[i][j];
             }
-            inertia[j][j] += self.joints[j].rotor_inertia;
+            inertia[j][j] += self.links[j].spec.rotor_inertia;
         }
         let mut coriolis = zero;
         for i in 0..joints {
@@ -106,12 +108,13 @@ impl Chain {
                 coriolis[i][j] = 0.5 * (turning[i][j] - turning[j][i]);
             }
         }
-        Dynamics { inertia, inertia_rate: rate, coriolis }
+        let [inertia, inertia_rate, coriolis] = [inertia, rate, coriolis].map(|matrix| self.joint_matrix(&matrix));
+        Dynamics { inertia, inertia_rate, coriolis }
     }
 
     fn twists(&self, links: &Links) -> [Spatial; MAX_JOINTS] {
         let mut twists = [Spatial { angular: DVec3::ZERO, linear: DVec3::ZERO }; MAX_JOINTS];
-        for (index, joint) in self.joints.iter().enumerate().take(MAX_JOINTS) {
+        for (index, Link { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS) {
             let axis = links.axes[index];
             twists[index] = match joint.kind {
                 JointKind::Revolute => Spatial { angular: axis, linear: links.origins[index].cross(axis) },
@@ -125,7 +128,7 @@ impl Chain {
     fn composite_inertias(&self, links: &Links) -> [Inertia; MAX_JOINTS] {
         let mut sum = Inertia { mass: 0.0, first: DVec3::ZERO, second: DMat3::ZERO };
         let mut composite = [sum; MAX_JOINTS];
-        for (index, joint) in self.joints.iter().enumerate().take(MAX_JOINTS).rev() {
+        for (index, Link { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS).rev() {
             let rotation = links.rotations[index];
             let centre = links.origins[index] + rotation * joint.centre_of_mass;
             let outer = DMat3::from_cols(centre.x * centre, centre.y * centre, centre.z * centre);

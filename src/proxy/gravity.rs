@@ -1,6 +1,6 @@
 //! Torque of gravity on the chain.
 
-use super::{Chain, Pose};
+use super::{Chain, Link, Pose};
 use crate::JointVector;
 use glam::DVec3;
 
@@ -9,14 +9,14 @@ impl Chain {
     /// m Jv^T g, Jv the Jacobian of the link's centre of mass (N m or N).
     #[must_use]
     pub fn gravity_torque(&self, pose: &Pose, gravity: DVec3) -> JointVector {
-        let mut torque = JointVector::zeros(self.degrees_of_freedom());
-        for (link, joint) in self.joints.iter().enumerate() {
+        let mut torque = JointVector::zeros(self.links.len());
+        for (link, Link { spec: joint, .. }) in self.links.iter().enumerate() {
             let centre = pose.origins[link] + pose.rotations[link] * joint.centre_of_mass;
             for (i, torque) in torque.iter_mut().enumerate().take(link + 1) {
                 *torque += joint.mass * self.point_velocity(pose, centre, i).dot(gravity);
             }
         }
-        torque
+        self.joint_torque(&torque)
     }
 }
 
@@ -33,8 +33,8 @@ mod tests {
             let energy = |t: f64| {
                 let pose = random::at(&chain, &q, &rate, t);
                 let height =
-                    |link: usize| pose.origins[link] + pose.rotations[link] * chain.joints[link].centre_of_mass;
-                -(0..q.len()).map(|link| chain.joints[link].mass * height(link).dot(gravity)).sum::<f64>()
+                    |link: usize| pose.origins[link] + pose.rotations[link] * chain.links[link].spec.centre_of_mass;
+                -(0..chain.links.len()).map(|link| chain.links[link].spec.mass * height(link).dot(gravity)).sum::<f64>()
             };
             let power = chain.gravity_torque(&random::at(&chain, &q, &rate, 0.0), gravity).dot(&rate);
             let slope = (energy(STEP) - energy(-STEP)) / (2.0 * STEP);

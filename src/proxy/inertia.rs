@@ -5,7 +5,7 @@
 //! inertia is positive in a validated scene, so that M is positive definite in every configuration, singular arms
 //! included.
 
-use super::{Chain, Pose};
+use super::{Chain, Link, Pose};
 use crate::scene::JointKind;
 use crate::{JointMatrix, MAX_JOINTS};
 use glam::DVec3;
@@ -16,7 +16,7 @@ impl Chain {
     #[must_use]
     pub fn inertia(&self, pose: &Pose) -> JointMatrix {
         let mut inertia = [[0.0; MAX_JOINTS]; MAX_JOINTS];
-        for (link, joint) in self.joints.iter().enumerate().take(MAX_JOINTS) {
+        for (link, Link { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS) {
             inertia[link][link] += joint.rotor_inertia;
             let rotation = pose.rotations[link];
             let centre = pose.origins[link] + rotation * joint.centre_of_mass;
@@ -35,13 +35,13 @@ impl Chain {
                 *entry = lower[j][i];
             }
         }
-        inertia
+        self.joint_matrix(&inertia)
     }
 
-    /// Angular velocity of the links beyond `joint`, for a unit rate of it.
-    fn spin(&self, pose: &Pose, joint: usize) -> DVec3 {
-        match self.joints[joint].kind {
-            JointKind::Revolute => pose.axes[joint],
+    /// Angular velocity of `link` and those beyond it, for a unit rate of it.
+    pub(super) fn spin(&self, pose: &Pose, link: usize) -> DVec3 {
+        match self.links[link].spec.kind {
+            JointKind::Revolute => pose.axes[link],
             JointKind::Prismatic => DVec3::ZERO,
         }
     }
@@ -64,7 +64,8 @@ mod tests {
         for (chain, q, rate) in random::chains() {
             let [before, pose, after] = [-STEP, 0.0, STEP].map(|t| random::at(&chain, &q, &rate, t));
             let mut energy = 0.0;
-            for (link, joint) in chain.joints.iter().enumerate() {
+            let rates = chain.link_rates(&rate);
+            for (link, Link { spec: joint, .. }) in chain.links.iter().enumerate() {
                 // Velocities by central differences of the link's placement, and the spin from R^T dR/dt = [w] in its
                 // frame.
                 let centre = |pose: &Pose| pose.origins[link] + pose.rotations[link] * joint.centre_of_mass;
@@ -73,7 +74,7 @@ mod tests {
                 let cross = pose.rotations[link].transpose() * turning;
                 let spin = DVec3::new(cross.y_axis.z, cross.z_axis.x, cross.x_axis.y);
                 energy += joint.mass * velocity.length_squared() + (joint.inertia * spin).dot(spin);
-                energy += joint.rotor_inertia * rate[link] * rate[link];
+                energy += joint.rotor_inertia * rates[link] * rates[link];
             }
             let product = twice_energy(&chain.inertia(&pose), &rate);
             assert!((product / energy - 1.0).abs() < 1e-7, "{product} against {energy}");

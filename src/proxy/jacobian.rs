@@ -1,7 +1,8 @@
 //! Jacobians J_i of the contact nodes, column by column.
 //!
 //! Column j of J_i is the velocity of node i for a unit rate of joint j: a_j x (x_i - o_j) for a revolute joint with
-//! axis a_j through o_j, a_j for a prismatic one, and zero where joint j lies beyond the node's link.
+//! axis a_j through o_j, a_j for a prismatic one, and zero where joint j lies beyond the node's link. The columns of
+//! joints that follow it add to it, each times its multiplier.
 
 use super::{Chain, Pose};
 use crate::JointVector;
@@ -12,10 +13,26 @@ impl Chain {
     /// Column `joint` of J_i of contact node `node` (m/rad, or 1 for a prismatic joint).
     #[must_use]
     pub fn jacobian_column(&self, pose: &Pose, node: usize, joint: usize) -> DVec3 {
-        if joint > self.nodes[node].link {
-            return DVec3::ZERO;
-        }
-        self.point_velocity(pose, pose.nodes[node], joint)
+        let velocity = |link: usize| self.links[link].multiplier * self.point_velocity(pose, pose.nodes[node], link);
+        self.inward(node).filter(|link| self.links[*link].joint == joint).map(velocity).sum()
+    }
+
+    /// Second derivative of the position of contact node `node` by the coordinates of `joints`: that of two links is the
+    /// velocity for the outer one turned about the axis of the inner one (m/rad^2, m/rad or 0).
+    #[must_use]
+    pub fn node_curvature(&self, pose: &Pose, node: usize, joints: [usize; 2]) -> DVec3 {
+        let moved_by = |joint| self.inward(node).filter(move |link| self.links[*link].joint == joint);
+        let pairs = moved_by(joints[0]).flat_map(|a| moved_by(joints[1]).map(move |b| [a, b]));
+        let curvature = |[a, b]: [usize; 2]| {
+            let turn = self.spin(pose, a.min(b)).cross(self.point_velocity(pose, pose.nodes[node], a.max(b)));
+            self.links[a].multiplier * self.links[b].multiplier * turn
+        };
+        pairs.map(curvature).sum()
+    }
+
+    /// Numbers of the links that carry contact node `node`.
+    fn inward(&self, node: usize) -> std::ops::RangeInclusive<usize> {
+        0..=self.nodes[node].link
     }
 
     /// Adds J_i^T `force` to `torque`, for a force (N) at contact node `node`.
@@ -29,31 +46,40 @@ impl Chain {
     /// `ranges` [m/rad, or 1 for a prismatic joint]: the lengths of the links between joint j and the node, added up.
     #[must_use]
     pub fn jacobian_bounds(&self, ranges: &[[f64; 2]]) -> Vec<JointVector> {
+        let of_joints = |bounds: JointVector| {
+            let mut gathered = JointVector::zeros(self.joints.len());
+            self.links
+                .iter()
+                .zip(bounds.iter())
+                .for_each(|(link, r)| gathered[link.joint] += link.multiplier.abs() * r);
+            gathered
+        };
+        self.link_bounds(ranges).into_iter().map(of_joints).collect()
+    }
+
+    /// The same of each link: bounds of the node's velocity for a unit rate of that link alone.
+    #[must_use]
+    pub fn link_bounds(&self, ranges: &[[f64; 2]]) -> Vec<JointVector> {
         let bounds = self.nodes.iter().map(|node| {
-            let mut bound = JointVector::zeros(self.joints.len());
+            let mut bound = JointVector::zeros(self.links.len());
             let mut distance = node.position.length();
-            for j in (0..=node.link).rev() {
-                let joint = &self.joints[j];
-                let slide = match joint.kind {
-                    JointKind::Revolute => 0.0,
-                    JointKind::Prismatic => ranges[j][0].abs().max(ranges[j][1].abs()),
-                };
-                bound[j] = match joint.kind {
+            for (bound, link) in bound.iter_mut().zip(&self.links).take(node.link + 1).rev() {
+                *bound = match link.spec.kind {
                     JointKind::Revolute => distance,
                     JointKind::Prismatic => 1.0,
                 };
-                distance += joint.origin.length() + slide;
+                distance += link.spec.origin.length() + link.slide(ranges);
             }
             bound
         });
         bounds.collect()
     }
 
-    /// Velocity, for a unit rate of `joint`, of a point that moves with a link beyond it.
-    pub(super) fn point_velocity(&self, pose: &Pose, point: DVec3, joint: usize) -> DVec3 {
-        let axis = pose.axes[joint];
-        match self.joints[joint].kind {
-            JointKind::Revolute => axis.cross(point - pose.origins[joint]),
+    /// Velocity, for a unit rate of `link`, of a point that moves with it or with a link beyond it.
+    pub(super) fn point_velocity(&self, pose: &Pose, point: DVec3, link: usize) -> DVec3 {
+        let axis = pose.axes[link];
+        match self.links[link].spec.kind {
+            JointKind::Revolute => axis.cross(point - pose.origins[link]),
             JointKind::Prismatic => axis,
         }
     }

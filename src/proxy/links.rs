@@ -6,7 +6,7 @@ use crate::MAX_JOINTS;
 use crate::scene::JointKind;
 use glam::{DMat3, DVec3};
 
-/// Link frames and joint axes in the world; the first d entries count.
+/// Link frames and joint axes in the world; one entry for each link, then zeros.
 #[derive(Clone, Copy, Debug)]
 pub struct Links {
     /// Origins o of the link frames (m).
@@ -18,7 +18,7 @@ pub struct Links {
 }
 
 impl Chain {
-    /// The link frames at configuration `q`, one number per joint; missing ones count as zero. Allocates nothing.
+    /// The link frames at configuration `q`, one number per independent joint; missing ones count as zero. Allocates nothing.
     #[must_use]
     pub fn links(&self, q: &[f64]) -> Links {
         let mut links = Links {
@@ -27,8 +27,8 @@ impl Chain {
             axes: [DVec3::ZERO; MAX_JOINTS],
         };
         let (mut origin, mut rotation) = (DVec3::ZERO, DMat3::IDENTITY);
-        for (index, joint) in self.joints.iter().enumerate().take(MAX_JOINTS) {
-            let coordinate = q.get(index).copied().unwrap_or(0.0);
+        for (index, link) in self.links.iter().enumerate().take(MAX_JOINTS) {
+            let (joint, coordinate) = (&link.spec, link.coordinate(q));
             let axis = rotation * joint.axis;
             origin += rotation * joint.origin;
             match joint.kind {
@@ -53,11 +53,12 @@ impl Chain {
     #[must_use]
     pub fn node_jacobian(&self, links: &Links, node: usize, position: DVec3) -> [DVec3; MAX_JOINTS] {
         let mut columns = [DVec3::ZERO; MAX_JOINTS];
-        for (index, joint) in self.joints.iter().enumerate().take(self.nodes[node].link + 1) {
-            columns[index] = match joint.kind {
-                JointKind::Revolute => links.axes[index].cross(position - links.origins[index]),
-                JointKind::Prismatic => links.axes[index],
-            };
+        for (index, link) in self.links.iter().enumerate().take(self.nodes[node].link + 1) {
+            columns[link.joint] += link.multiplier
+                * match link.spec.kind {
+                    JointKind::Revolute => links.axes[index].cross(position - links.origins[index]),
+                    JointKind::Prismatic => links.axes[index],
+                };
         }
         columns
     }

@@ -1,9 +1,10 @@
-//! Random chains for this room's tests: 1 to 6 joints, both kinds mixed, the same in every run.
+//! Random chains for this room's tests: 1 to 6 links, both kinds mixed, the same in every run. In every other one joint
+//! follows another, from before it or behind it.
 
-use super::{Chain, Node};
+use super::Chain;
 use crate::JointVector;
 use crate::random::Random;
-use crate::scene::{JointKind, JointSpec};
+use crate::scene::{Follows, JointKind, JointSpec, ProxyNodeSpec, ProxySpec};
 use glam::DMat3;
 
 /// Sixty chains, each with a configuration and a rate.
@@ -26,16 +27,24 @@ pub fn chains() -> impl Iterator<Item = (Chain, JointVector, JointVector)> {
             },
             rotor_inertia: 1e-3 * (1.1 + random.between(-1.0, 1.0)),
             nodes: Vec::new(),
+            follows: None,
         });
-        let joints: Vec<JointSpec> = joints.collect();
-        let nodes =
-            (0..3 * count).map(|k| Node { link: k / 3, position: 0.2 * random.vector(), radius: 0.0, length: 0.0 });
-        let nodes = nodes.collect();
-        let mut vector = |size: f64| {
-            JointVector::from_slice(&(0..count).map(|_| size * random.between(-1.0, 1.0)).collect::<Vec<_>>())
-        };
+        let mut joints: Vec<JointSpec> = joints.collect();
+        for joint in &mut joints {
+            let node = || ProxyNodeSpec { position: 0.2 * random.vector(), radius: 0.0, length: 0.0 };
+            joint.nodes = std::iter::repeat_with(node).take(3).collect();
+        }
+        if seed % 2 == 1 && count > 1 {
+            let [follower, leader] = [seed as usize / 2 % count, (seed as usize / 2 + 1) % count];
+            let (multiplier, offset) = (1.5 * random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+            joints[follower].limits = [-9.0, 9.0];
+            joints[follower].follows = Some(Follows { joint: joints[leader].name.clone(), multiplier, offset });
+        }
+        let chain = Chain::new(&ProxySpec::new(joints).unwrap());
+        let mut vector =
+            |size: f64| -> JointVector { (0..chain.joints.len()).map(|_| size * random.between(-1.0, 1.0)).collect() };
         let (q, rate) = (vector(2.0), vector(3.0));
-        (Chain { joints, nodes }, q, rate)
+        (chain, q, rate)
     })
 }
 

@@ -59,7 +59,7 @@ impl EndForce {
     /// link alone.
     #[must_use]
     pub fn is_known(chain: &Chain) -> bool {
-        let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.joints.len());
+        let at_the_end = chain.nodes.iter().all(|node| node.link + 1 == chain.links.len());
         chain.joints.len() == 3 && !chain.nodes.is_empty() && at_the_end
     }
 
@@ -132,6 +132,7 @@ mod tests {
     #[test]
     fn the_force_has_the_torques_it_was_made_of() {
         let joint = |axis: DVec3, origin: DVec3, nodes: Vec<ProxyNodeSpec>| JointSpec {
+            follows: None,
             name: String::new(),
             kind: JointKind::Revolute,
             origin,
@@ -149,7 +150,7 @@ mod tests {
             joint(DVec3::Y, DVec3::ZERO, vec![]),
             joint(DVec3::Y, DVec3::X * 0.15, end),
         ];
-        let chain = Chain::new(&ProxySpec { joints });
+        let chain = Chain::new(&ProxySpec { joints, ..Default::default() });
         let q = JointVector::from_slice(&[0.3, -0.2, 1.4]);
         let force = DVec3::new(1.0, -2.0, 3.0);
         let mut pose = chain.new_pose();

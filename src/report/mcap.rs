@@ -142,7 +142,7 @@ impl<'a> Shown<'a> {
     ) -> io::Result<Self> {
         let transforms = writer.topic::<Transforms>("/tf")?;
         let topic = writer.topic::<RobotDescription>("/robot_description")?;
-        let reach: f64 = chain.joints.iter().map(|joint| joint.origin.length()).sum();
+        let reach: f64 = chain.links.iter().map(|link| link.spec.origin.length()).sum();
         let urdf = description(chain, "arm", WORLD, RADIUS * reach.max(f64::MIN_POSITIVE));
         writer.write(topic, &RobotDescription { stamp: 0, urdf })?;
         let mut topic = |name| writer.topic::<Markers>(name);
@@ -156,8 +156,9 @@ impl<'a> Shown<'a> {
             self.next = stamp + POSE_PERIOD;
             let mut pose = self.chain.new_pose();
             self.chain.pose(&tick.proxy, &mut pose);
-            let joints = self.chain.joints.iter().enumerate();
-            let frames = joints.map(|(number, joint)| (joint.name.clone(), shape_frame(Some(number), &pose))).collect();
+            let links = self.chain.links.iter().enumerate();
+            let frames =
+                links.map(|(number, link)| (link.spec.name.clone(), shape_frame(Some(number), &pose))).collect();
             writer.write(self.transforms, &Transforms { stamp, frames })?;
         }
         let Some((object, [surface, contact])) = self.object.zip(self.markers) else { return Ok(()) };

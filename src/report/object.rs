@@ -362,7 +362,7 @@ mod tests {
     #[test]
     fn vertices_end_where_the_camera_projects_them() {
         let (nodes, triangles) = octahedron();
-        let chain = Chain { joints: vec![], nodes: vec![] };
+        let chain = Chain::default();
         let instants = [instant(&nodes, 0.0)];
         let scene = Scene::new(&chain, &nodes, &triangles, &instants);
         let picture = scene.picture(&instants[0]);
@@ -378,7 +378,7 @@ mod tests {
     #[test]
     fn a_pressed_vertex_moves_on_the_picture_and_takes_the_deepest_colour() {
         let (nodes, triangles) = octahedron();
-        let chain = Chain { joints: vec![], nodes: vec![] };
+        let chain = Chain::default();
         let instants = [instant(&nodes, 0.0), instant(&nodes, 0.02)];
         let scene = Scene::new(&chain, &nodes, &triangles, &instants);
         let [free, pressed] = [0, 1].map(|number: usize| scene.picture(&instants[number]));
@@ -397,7 +397,7 @@ mod tests {
     #[test]
     fn the_arrow_of_a_force_begins_at_its_node_and_pushes_the_arm_out() {
         let (nodes, triangles) = octahedron();
-        let chain = Chain { joints: vec![], nodes: vec![] };
+        let chain = Chain::default();
         let instants = [instant(&nodes, 0.02)];
         let scene = Scene::new(&chain, &nodes, &triangles, &instants);
         let [(tail, tip)] = scene.arrows(&instants[0])[..] else { panic!("one arrow") };

@@ -53,6 +53,8 @@ pub struct ArmJoint {
     pub name: String,
     /// Turning or sliding.
     pub kind: JointKind,
+    /// How it follows another joint of the chain, where it does.
+    pub follows: Option<Mimic>,
     /// In the frame of the joint before, parallel to the world at q = 0 (m).
     pub origin: DVec3,
     /// Unit vector, parallel to the world at q = 0.
@@ -116,6 +118,7 @@ impl Arm {
             joints.push(ArmJoint {
                 name: joint.name.clone(),
                 kind,
+                follows: builder.follows(number)?,
                 origin: place.translation - before,
                 axis: (place.matrix3 * joint.axis).normalize_or(joint.axis),
                 limits,
@@ -132,7 +135,8 @@ impl Arm {
     }
 }
 
-/// Motions of the joints that do not move: identity if fixed, that of its value if locked or if it follows a locked one.
+/// Motions of the joints that do not move: identity if fixed, that of its value if locked or if it follows a locked one,
+/// or one by no multiple.
 fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error> {
     let fixed = robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointType::Fixed);
     let mut held: HashMap<usize, DAffine3> = fixed.map(|(number, _)| (number, DAffine3::IDENTITY)).collect();
@@ -167,7 +171,8 @@ fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error
         let before = held.len();
         for (number, joint) in robot.joints.iter().enumerate().filter(|(_, joint)| joint.mimic.is_some()) {
             let value = joint.mimic.as_ref().and_then(|Mimic { joint, multiplier, offset }| {
-                values.get(joint.as_str()).map(|value| multiplier * value + offset)
+                let leader = values.get(joint.as_str()).copied().or((*multiplier == 0.0).then_some(0.0));
+                leader.map(|value| multiplier * value + offset)
             });
             let motion = value.and_then(|value| Some((value, joint.motion(value)?)));
             if let (Some((value, motion)), false) = (motion, held.contains_key(&number)) {
@@ -269,26 +274,59 @@ impl Builder<'_> {
         group
     }
 
+    /// Returns how joint `number` follows another of the chain: the one that it names, or where that is not in the chain,
+    /// the first that follows it, too.
+    fn follows(&mut self, number: usize) -> Result<Option<Mimic>, Error> {
+        let joint = &self.robot.joints[number];
+        let Some(Mimic { joint: named, .. }) = &joint.mimic else { return Ok(None) };
+        let moving = self.way.iter().filter(|number| !self.held.contains_key(number));
+        let roots = moving.map(|&number| Ok((number, self.root(number)?))).collect::<Result<Vec<_>, Error>>()?;
+        let own = self.root(number)?;
+        let mut fellows = roots.iter().filter(|(_, other)| other.joint == own.joint);
+        let is_root = |(other, _): &&(usize, Mimic)| self.robot.joints[*other].name == own.joint;
+        let leader = fellows.clone().find(is_root).or_else(|| fellows.next());
+        Ok(match leader {
+            Some((other, of_leader)) if *other != number => {
+                let multiplier = own.multiplier / of_leader.multiplier;
+                let offset = own.offset - multiplier * of_leader.offset;
+                Some(Mimic { joint: self.robot.joints[*other].name.clone(), multiplier, offset })
+            }
+            _ => {
+                let message = format!(
+                    "joint {:?} follows {named:?} (mimic), which is not in the chain: it moves by itself in the scene",
+                    joint.name
+                );
+                self.note(&joint.span, message);
+                None
+            }
+        })
+    }
+
+    /// Returns how joint `number` follows the one that follows no other, itself where it does not.
+    fn root(&self, number: usize) -> Result<Mimic, Error> {
+        let mut joint = &self.robot.joints[number];
+        let (mut multiplier, mut offset) = (1.0, 0.0);
+        for _ in &self.robot.joints {
+            let Some(mimic) = &joint.mimic else { break };
+            offset += multiplier * mimic.offset;
+            multiplier *= mimic.multiplier;
+            let leader = self.robot.joints.iter().find(|other| other.name == mimic.joint);
+            let Some(leader) = leader else {
+                return Ok(Mimic { joint: mimic.joint.clone(), multiplier, offset });
+            };
+            joint = leader;
+        }
+        if joint.mimic.is_some() {
+            let message = format!("joint {:?} follows itself (mimic): remove one <mimic>", joint.name);
+            return Err(self.robot.source().error(joint.span.clone(), message));
+        }
+        Ok(Mimic { joint: joint.name.clone(), multiplier, offset })
+    }
+
     /// Returns kind and limits of a joint of the chain.
     fn movement(&mut self, joint: &Joint) -> Result<(JointKind, [f64; 2]), Error> {
         let name = &joint.name;
         let refuse = |message: String| Err(self.robot.source().error(joint.span.clone(), message));
-        if let Some(Mimic { joint: leader, .. }) = &joint.mimic {
-            let chain = self.way.iter().map(|&number| &self.robot.joints[number]).filter(|other| other.name != *name);
-            if chain
-                .into_iter()
-                .any(|other| other.name == *leader || other.mimic.as_ref().is_some_and(|mimic| mimic.joint == *leader))
-            {
-                return refuse(format!(
-                    "joint {name:?} follows {leader:?} (mimic), as another joint of the chain does or is, and the \
-                     joints of a scene move independently: hold both with --lock {leader}=VALUE, or remove <mimic>"
-                ));
-            }
-            let message = format!(
-                "joint {name:?} follows {leader:?} (mimic), which is not in the chain: it moves by itself in the scene"
-            );
-            self.note(&joint.span, message);
-        }
         let kind = match joint.kind {
             JointType::Prismatic => JointKind::Prismatic,
             JointType::Floating | JointType::Planar => {

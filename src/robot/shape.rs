@@ -12,9 +12,10 @@ pub(super) fn write(text: &mut String, proxy: &ProxySpec, shapes: &[LinkShape]) 
     }
     heading(text, "The links' shapes: drawn, not felt")?;
     writeln!(text, "# Without a joint: what stands still. Leave out what you do not want to see.")?;
+    let links = proxy.links();
     for LinkShape { joint, place, form } in shapes {
         writeln!(text, "\n[[proxy.shape]]")?;
-        if let Some(joint) = joint.and_then(|joint| proxy.joints.get(joint)) {
+        if let Some((_, joint)) = joint.and_then(|joint| links.get(joint)) {
             entry(text, "joint", &format!("{:?}", joint.name), "")?;
         }
         match form {

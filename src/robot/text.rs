@@ -1,8 +1,8 @@
 //! The scene file of an arm, as a person would have written it.
 
-use super::{Arm, ArmJoint, ContactNodes, Robot};
+use super::{Arm, ArmJoint, ContactNodes, Mimic, Robot};
 use super::{practice::Practice, shape};
-use crate::scene::{JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
+use crate::scene::{Follows, JointKind, JointSpec, LinkShape, ProxyNodeSpec, ProxySpec, Scene};
 use crate::toml_text::{coarse, comment, entry, heading, list, number, significant, vector};
 use crate::{Error, MAX_AXES};
 use crate::{
@@ -36,20 +36,25 @@ pub fn write_scene(
     shapes: &[LinkShape],
     command: &str,
 ) -> Result<String, Error> {
-    let proxy = proxy(arm, nodes);
+    let specs = joints(arm, nodes);
+    let proxy = ProxySpec::new(specs.clone()).map_err(|(number, why)| {
+        let name = &arm.joints[number].name;
+        let span = robot.joints.iter().find(|joint| joint.name == *name).map_or(0..0, |joint| joint.span.clone());
+        robot.source().error(span, format!("joint {name:?} follows another (mimic): {why}"))
+    })?;
     let no_nodes = || Error::at(&robot.path, "the arm has no contact node, and could touch nothing");
     let practice = Practice::new(&Chain::new(&proxy)).ok_or_else(no_nodes)?;
     let mut text = String::new();
     // Writing to a string fails only where memory does.
-    let _ = write(&mut text, robot, arm, &proxy, nodes, &practice, command);
+    let _ = write(&mut text, robot, arm, (&specs, &proxy), nodes, &practice, command);
     let _ = shape::write(&mut text, &proxy, shapes);
     Scene::parse(&text, robot.path.with_extension("toml"))
         .map_err(|error| error.within("the scene made of the robot is not valid, a fault of this program"))?;
     Ok(text)
 }
 
-/// The chain as the scene has it: numbers rounded as they are written.
-fn proxy(arm: &Arm, nodes: &ContactNodes) -> ProxySpec {
+/// The joints of the chain as the scene has them: numbers rounded as they are written.
+fn joints(arm: &Arm, nodes: &ContactNodes) -> Vec<JointSpec> {
     let mut joints: Vec<JointSpec> = Vec::new();
     for (joint, nodes) in arm.joints.iter().zip(&nodes.of_joints) {
         let name = name(&joint.name, &joints);
@@ -57,17 +62,28 @@ fn proxy(arm: &Arm, nodes: &ContactNodes) -> ProxySpec {
         joints.push(JointSpec {
             name,
             kind: joint.kind,
+            follows: None,
             origin: joint.origin,
             axis: joint.axis,
             limits: joint.limits.map(|limit| (limit * 1e9).round() / 1e9),
             mass: joint.inertial.mass,
             centre_of_mass: joint.inertial.centre,
             inertia: joint.inertial.inertia,
-            rotor_inertia: joint.rotor_inertia.unwrap_or(ROTOR[usize::from(joint.kind == JointKind::Prismatic)]),
+            // A joint that follows another needs no actuator.
+            rotor_inertia: joint.rotor_inertia.unwrap_or(match joint.follows {
+                Some(_) => 0.0,
+                None => ROTOR[usize::from(joint.kind == JointKind::Prismatic)],
+            }),
             nodes: nodes.iter().map(node).collect(),
         });
     }
-    ProxySpec { joints }
+    for (number, joint) in arm.joints.iter().enumerate() {
+        let Some(Mimic { joint: leader, multiplier, offset }) = &joint.follows else { continue };
+        let leader = arm.joints.iter().position(|other| other.name == *leader).unwrap_or(number);
+        let [multiplier, offset] = [multiplier, offset].map(|x| (x * 1e9).round() / 1e9);
+        joints[number].follows = Some(Follows { joint: joints[leader].name.clone(), multiplier, offset });
+    }
+    joints
 }
 
 /// Returns a joint's name in letters that a scene takes, other than those before.
@@ -84,7 +100,7 @@ fn write(
     text: &mut String,
     robot: &Robot,
     arm: &Arm,
-    proxy: &ProxySpec,
+    (specs, proxy): (&[JointSpec], &ProxySpec),
     nodes: &ContactNodes,
     practice: &Practice,
     command: &str,
@@ -104,7 +120,7 @@ fn write(
         "# {count} contact nodes on the shapes of the moving links, {} m apart or more.",
         number(nodes.spacing, 6)
     )?;
-    for (joint, spec) in arm.joints.iter().zip(&proxy.joints) {
+    for (joint, spec) in arm.joints.iter().zip(specs) {
         write_joint(text, joint, spec)?;
     }
 
@@ -178,6 +194,11 @@ fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fm
     writeln!(text, "\n[[proxy.joint]]")?;
     entry(text, "name", &format!("\"{}\"", spec.name), &format!("moves {}", joint.links.join(", ")))?;
     entry(text, "kind", if turns { "\"revolute\"" } else { "\"prismatic\"" }, "")?;
+    if let Some(Follows { joint, multiplier, offset }) = &spec.follows {
+        let [multiplier, offset] = [multiplier, offset].map(|x| number(*x, 9));
+        let table = format!("{{ joint = {joint:?}, multiplier = {multiplier}, offset = {offset} }}");
+        entry(text, "follows", &table, &format!("{} = multiplier * that one's + offset", spec.kind.unit()))?;
+    }
     entry(text, "origin", &vector(spec.origin, 9), "m")?;
     entry(text, "axis", &vector(spec.axis, 9), "")?;
     entry(text, "limits", &list(&spec.limits, |x| number(*x, 9)), spec.kind.unit())?;
@@ -196,7 +217,9 @@ fn write_joint(text: &mut String, joint: &ArmJoint, spec: &JointSpec) -> std::fm
     }
     let unit = if turns { "kg m^2" } else { "kg" };
     let source = if joint.rotor_inertia.is_some() { "" } else { ", not in the robot's file" };
-    entry(text, "rotor_inertia", &significant(spec.rotor_inertia), &format!("{unit}, of the actuator{source}"))?;
+    if spec.rotor_inertia > 0.0 {
+        entry(text, "rotor_inertia", &significant(spec.rotor_inertia), &format!("{unit}, of the actuator{source}"))?;
+    }
     if spec.nodes.is_empty() {
         return Ok(());
     }
@@ -225,12 +248,13 @@ fn write_haptics(text: &mut String, arm: &Arm, proxy: &ProxySpec, press: &Press)
     entry(text, "coupling_damping", &scaled(5e-4), "N m s/rad or N s/m")?;
     entry(text, "device_damping", &scaled(1.5e-3), "N m s/rad or N s/m")?;
     entry(text, "device_inertia", &scaled(5e-5), "kg m^2 or kg")?;
-    let limits: Vec<f64> = (press.levers.iter().zip(&arm.joints))
+    let joints = || arm.joints.iter().filter(|joint| joint.follows.is_none());
+    let limits: Vec<f64> = (press.levers.iter().zip(joints()))
         .map(|(lever, joint)| (TIP_FORCE * lever).min(joint.effort.unwrap_or(f64::INFINITY)))
         .collect();
     entry(text, "torque_limit", &list(&limits, |x| coarse(*x)), "N m or N")?;
     entry(text, "torque_rate_limit", &list(&limits, |x| coarse(300.0 * x)), "N m/s or N/s")?;
-    for (joint, spec) in arm.joints.iter().zip(&proxy.joints) {
+    for (joint, spec) in joints().zip(&proxy.joints) {
         let rated = [
             joint.effort.map(|x| format!("{} {}", coarse(x), spec.kind.effort_unit())),
             joint.velocity.map(|x| format!("{} {}/s", coarse(x), spec.kind.unit())),

@@ -1,7 +1,11 @@
 //! An arm as a URDF text, for programs that show robots: joints, inertia, and rods from joint to joint with balls at the
 //! contact nodes.
 
-use crate::{names::Xml, proxy::Chain, scene::JointKind};
+use crate::{
+    names::Xml,
+    proxy::{Chain, Link},
+    scene::{Follows, JointKind},
+};
 use glam::DVec3;
 use std::fmt::Write;
 
@@ -21,7 +25,7 @@ pub fn description(chain: &Chain, name: &str, base: &str, radius: f64) -> String
 fn describe(out: &mut String, chain: &Chain, name: &str, base: &str, radius: f64) -> std::fmt::Result {
     writeln!(out, "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n  <link name=\"{}\"/>", Xml(name), Xml(base))?;
     let mut parent = base;
-    for (number, joint) in chain.joints.iter().enumerate() {
+    for (number, Link { spec: joint, .. }) in chain.links.iter().enumerate() {
         let kind = match joint.kind {
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",
@@ -31,6 +35,10 @@ fn describe(out: &mut String, chain: &Chain, name: &str, base: &str, radius: f64
         writeln!(out, "    <child link=\"{link}\"/>\n    <origin xyz=\"{}\"/>", Numbers(joint.origin))?;
         writeln!(out, "    <axis xyz=\"{}\"/>", Numbers(joint.axis))?;
         writeln!(out, "    <limit lower=\"{low}\" upper=\"{high}\" effort=\"{0}\" velocity=\"{0}\"/>", UNLIMITED)?;
+        if let Some(Follows { joint, multiplier, offset }) = &joint.follows {
+            let leader = Xml(joint);
+            writeln!(out, "    <mimic joint=\"{leader}\" multiplier=\"{multiplier}\" offset=\"{offset}\"/>")?;
+        }
         writeln!(out, "  </joint>\n  <link name=\"{link}\">")?;
         if joint.mass > 0.0 {
             let i = joint.inertia;
@@ -44,7 +52,7 @@ fn describe(out: &mut String, chain: &Chain, name: &str, base: &str, radius: f64
         }
         let nodes = || chain.nodes.iter().filter(|node| node.link == number);
         let farthest = nodes().map(|node| node.position).max_by(|a, b| a.length().total_cmp(&b.length()));
-        let end = chain.joints.get(number + 1).map(|next| next.origin).or(farthest).unwrap_or_default();
+        let end = chain.links.get(number + 1).map(|next| next.spec.origin).or(farthest).unwrap_or_default();
         if end != DVec3::ZERO {
             // From the cylinder's axis z to the rod: about y, then about z.
             let (pitch, yaw) = (end.z.atan2(end.truncate().length()), end.y.atan2(end.x));

@@ -16,7 +16,7 @@ use toml::{
 const TABLES: &str = "object object.sphere object.mesh object.tetrahedra object.springs object.elasticity \
     object.elasticity.inclusion.* object.elasticity.inclusion.*.sphere object.skin object.ground \
     object.relaxation proxy proxy.joint.* \
-    proxy.joint.*.nodes.* proxy.shape.* proxy.shape.*.cylinder proxy.shape.*.surface contact grid grid.axes.* scan \
+    proxy.joint.*.nodes.* proxy.joint.*.follows proxy.shape.* proxy.shape.*.cylinder proxy.shape.*.surface contact grid grid.axes.* scan \
     scan.workspace scan.workspace.across.* scan.workspace.depth scan.joints scan.joints.axes.* scan.control \
     scan.history scan.limits scan.simulated haptics haptics.friction haptics.four_channel haptics.hand graphics.stiffening motion \
     motion.press.* motion.scrape.* device";
@@ -87,7 +87,7 @@ impl Checker<'_> {
 
     /// Checks that the arm has a contact node of the number that stands at `path`.
     pub fn node(&self, path: &str, node: Option<usize>, proxy: &ProxySpec) -> Result<(), Error> {
-        let nodes: usize = proxy.joints.iter().map(|joint| joint.nodes.len()).sum();
+        let nodes = proxy.contact_nodes();
         match node {
             Some(node) if node >= nodes => {
                 Err(self

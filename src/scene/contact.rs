@@ -167,7 +167,7 @@ fn number_or_rigid<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error>
 impl ContactTable {
     /// Checks it against the arm, and gives the surface and the stiffness that it leaves out.
     pub fn check(self, checker: &Checker<'_>, proxy: &ProxySpec) -> Result<ContactSpec, Error> {
-        let nodes = || proxy.joints.iter().flat_map(|joint| &joint.nodes);
+        let nodes = || proxy.links().into_iter().flat_map(|(_, joint)| &joint.nodes);
         let error = |key: &str, message: &str| Err(checker.at(&format!("contact.{key}"), message));
         if self.updates.is_some() {
             return error("updates", "updates applied to the law \"linearised\", which no longer exists: leave it out");

@@ -114,7 +114,7 @@ pub(super) fn rendering(checker: &Checker<'_>, table: &mut SceneTable) -> Result
         graphics,
         motion,
         device,
-        shapes: shape::check(checker, take(&mut table.proxy.shape), joints)?,
+        shapes: shape::check(checker, take(&mut table.proxy.shape), &proxy)?,
         proxy,
     })
 }

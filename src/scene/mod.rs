@@ -43,7 +43,7 @@ pub use object::{
     ElasticSpec, GroundNodes, GroundSpec, GroundStiffness, InclusionPlace, InclusionSpec, Material, ObjectSpec,
     Placement, Shape, SpringKind, SpringSpec,
 };
-pub use proxy::{JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
+pub use proxy::{Follower, Follows, JointKind, JointSpec, MAX_CONTACT_NODES, ProxyNodeSpec, ProxySpec};
 pub use relaxation::{MOST_TERMS, RelaxationSpec};
 pub use scan::{
     Cover, HistorySpec, PlanAxis, PlanSpec, ScanControl, ScanLimits, ScanSpec, SpecimenSpec, WorkspacePlan,

@@ -4,11 +4,15 @@ use super::GRID_LINE;
 use super::check::Checker;
 use super::inertia::positive_semidefinite;
 use super::shape::ShapeTable;
-use super::value::{KEY, Range, count, direction, interval, not_negative, positive, vector};
+use super::value::{KEY, Range, count, direction, finite, interval, not_negative, positive, vector};
 use crate::MAX_JOINTS;
-use crate::{Error, names::counted};
+use crate::{
+    Error,
+    names::{counted, listed},
+};
 use glam::{DMat3, DVec3};
 use serde::de::{Deserialize, Deserializer, Error as _};
+use std::fmt;
 
 /// Default reflected inertia of the actuator of a revolute joint, that of a desktop device (kg m^2).
 const ROTOR_INERTIA: f64 = 1e-3;
@@ -20,11 +24,45 @@ const MAX_NAME: usize = 40;
 /// Most contact nodes of a chain: far more than a chain of six links needs, few enough for one per thread on a GPU.
 pub const MAX_CONTACT_NODES: usize = 4096;
 
-/// The multi-link virtual proxy: a serial chain of one to twelve joints.
-#[derive(Clone, Debug, PartialEq)]
+/// The multi-link virtual proxy: a serial chain of one to twelve joints, followers included.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProxySpec {
-    /// From the base outwards.
+    /// Those that move independently, from the base outwards: a configuration q has one coordinate for each.
     pub joints: Vec<JointSpec>,
+    /// Those that follow one of them, from the base outwards.
+    pub followers: Vec<Follower>,
+}
+
+/// A joint of the chain that follows another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Follower {
+    /// The joint, whose `follows` is given.
+    pub spec: JointSpec,
+    /// Number of the independent joint that it follows.
+    pub leader: usize,
+    /// Its place in the chain: the number of joints between it and the base.
+    pub link: usize,
+}
+
+impl fmt::Display for Follower {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(Follows { joint, multiplier, offset }) = &self.spec.follows else { return Ok(()) };
+        write!(f, "{} = {multiplier} {joint} + {offset} {}", self.spec.name, self.spec.kind.unit())
+    }
+}
+
+/// How a joint follows another: its coordinate is the affine function `multiplier * q + offset` of that one's.
+#[derive(Clone, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Follows {
+    /// Name of the joint that it follows.
+    pub joint: String,
+    /// Factor on that one's coordinate, not zero (1, m/rad or rad/m).
+    #[serde(default = "one", deserialize_with = "factor")]
+    pub multiplier: f64,
+    /// Coordinate where that one is at zero (rad or m).
+    #[serde(default, deserialize_with = "finite")]
+    pub offset: f64,
 }
 
 /// One joint and the link that it moves.
@@ -36,6 +74,9 @@ pub struct JointSpec {
     pub name: String,
     /// Turning or sliding.
     pub kind: JointKind,
+    /// How it follows another joint, where it does not move independently.
+    #[serde(default)]
+    pub follows: Option<Follows>,
     /// Joint frame's origin in the parent link's frame at q = 0 (m); all frames are parallel to the world at q = 0.
     #[serde(default, deserialize_with = "vector")]
     pub origin: DVec3,
@@ -54,8 +95,8 @@ pub struct JointSpec {
     /// Inertia about the centre of mass, along the link frame's axes, symmetric and positive semidefinite (kg m^2).
     #[serde(default = "no_inertia", deserialize_with = "inertia")]
     pub inertia: DMat3,
-    /// Reflected inertia of the actuator about the joint, positive, so that the chain's inertia is positive definite in
-    /// every configuration (kg m^2 or kg).
+    /// Reflected inertia of the actuator about the joint, positive where it moves independently, so that the chain's
+    /// inertia is positive definite in every configuration (kg m^2 or kg).
     #[serde(default, deserialize_with = "positive")]
     pub rotor_inertia: f64,
     /// Contact nodes of this link, in the link's frame.
@@ -120,11 +161,11 @@ impl ProxyTable {
         }
         for number in 0..joints.len() {
             let (earlier, rest) = joints.split_at_mut(number);
-            let Some(JointSpec { name, kind, rotor_inertia, .. }) = rest.first_mut() else { break };
+            let Some(JointSpec { name, kind, follows, rotor_inertia, .. }) = rest.first_mut() else { break };
             if name.is_empty() {
                 *name = format!("q{}", number + 1);
             }
-            if *rotor_inertia == 0.0 {
+            if *rotor_inertia == 0.0 && follows.is_none() {
                 *rotor_inertia = if *kind == JointKind::Revolute { ROTOR_INERTIA } else { ROTOR_MASS };
             }
             if earlier.iter().any(|joint| joint.name == *name) {
@@ -137,9 +178,76 @@ impl ProxyTable {
             nodes if nodes > MAX_CONTACT_NODES => {
                 at(format!("the proxy has {nodes} contact nodes: it may have at most {MAX_CONTACT_NODES}"))
             }
-            _ => Ok(ProxySpec { joints }),
+            _ => ProxySpec::new(joints)
+                .map_err(|(number, why)| checker.at(&format!("proxy.joint.{number}.follows"), why)),
         }
     }
+}
+
+impl ProxySpec {
+    /// The chain of `joints`, from the base outwards. The limits of followers narrow those of the joints they follow.
+    ///
+    /// # Errors
+    /// The number of a joint and what is wrong, where it follows none that moves independently, or leaves that one no
+    /// range.
+    pub fn new(joints: Vec<JointSpec>) -> Result<Self, (usize, String)> {
+        let follows = joints.iter().map(|joint| joint.follows.clone()).collect::<Vec<_>>();
+        let numbered = joints.into_iter().enumerate();
+        let (followers, independent): (Vec<_>, Vec<_>) = numbered.partition(|(number, _)| follows[*number].is_some());
+        let mut joints: Vec<JointSpec> = independent.into_iter().map(|(_, joint)| joint).collect();
+        let mut chain = Vec::new();
+        for ((link, spec), Follows { joint, multiplier, offset }) in followers.into_iter().zip(follows.iter().flatten())
+        {
+            let Some(leader) = joints.iter().position(|other| other.name == *joint) else {
+                let names: Vec<&String> = joints.iter().map(|joint| &joint.name).collect();
+                let remedy = match names[..] {
+                    [] => "let one joint follow none".into(),
+                    _ => format!("name one of {}", listed(&names)),
+                };
+                return Err((link, format!("there is no joint {joint:?} that moves independently: {remedy}")));
+            };
+            let mut ends = spec.limits.map(|limit| (limit - offset) / multiplier);
+            ends.sort_by(f64::total_cmp);
+            let [least, greatest] = &mut joints[leader].limits;
+            (*least, *greatest) = (least.max(ends[0]), greatest.min(ends[1]));
+            if least >= greatest {
+                let [low, high] = ends;
+                let why = format!(
+                    "its limits are met where {joint:?} is between {low} and {high}, out of that one's range: widen \
+                     limits, or correct multiplier and offset"
+                );
+                return Err((link, why));
+            }
+            chain.push(Follower { spec, leader, link });
+        }
+        Ok(Self { joints, followers: chain })
+    }
+
+    /// All joints from the base outwards, each with the number of the independent one that moves it.
+    #[must_use]
+    pub fn links(&self) -> Vec<(usize, &JointSpec)> {
+        let mut links: Vec<_> = self.joints.iter().enumerate().collect();
+        for Follower { spec, leader, link } in &self.followers {
+            links.insert((*link).min(links.len()), (*leader, spec));
+        }
+        links
+    }
+
+    /// Number of contact nodes of all links.
+    #[must_use]
+    pub fn contact_nodes(&self) -> usize {
+        self.links().iter().map(|(_, joint)| joint.nodes.len()).sum()
+    }
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn factor<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    let factor: f64 = finite(value)?;
+    let what = || D::Error::custom(format!("{KEY}is 0: a joint that does not move is part of the link before it"));
+    (factor != 0.0).then_some(factor).ok_or_else(what)
 }
 
 /// Names become columns of tables and legends of figures.

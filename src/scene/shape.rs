@@ -1,6 +1,6 @@
 //! Shapes of links: drawn, not felt. Nothing that is solved depends on them.
 
-use super::JointSpec;
+use super::ProxySpec;
 use super::check::Checker;
 use super::value::{edges, positive, rotation, vector};
 use crate::Error;
@@ -157,25 +157,25 @@ impl TryFrom<SurfaceTable> for LinkSurface {
     }
 }
 
-/// The shapes of an arm with `joints`.
+/// The shapes of the arm `proxy`.
 pub(super) fn check(
     checker: &Checker<'_>,
     tables: Vec<ShapeTable>,
-    joints: &[JointSpec],
+    proxy: &ProxySpec,
 ) -> Result<Vec<LinkShape>, Error> {
     if tables.len() > MAX_SHAPES {
         let message = format!("the arm has more than {MAX_SHAPES} shapes: leave some out");
         return Err(checker.at(&format!("proxy.shape.{MAX_SHAPES}"), message));
     }
+    let names: Vec<&str> = proxy.links().into_iter().map(|(_, joint)| joint.name.as_str()).collect();
     let shapes = tables.into_iter().enumerate();
-    shapes.map(|(number, table)| table.check(checker, &format!("proxy.shape.{number}"), joints)).collect()
+    shapes.map(|(number, table)| table.check(checker, &format!("proxy.shape.{number}"), &names)).collect()
 }
 
 impl ShapeTable {
-    fn check(self, checker: &Checker<'_>, path: &str, joints: &[JointSpec]) -> Result<LinkShape, Error> {
+    fn check(self, checker: &Checker<'_>, path: &str, names: &[&str]) -> Result<LinkShape, Error> {
         let number = |name: String| {
-            joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
-                let names: Vec<&str> = joints.iter().map(|joint| joint.name.as_str()).collect();
+            names.iter().position(|joint| *joint == name).ok_or_else(|| {
                 let message = format!("there is no joint {name:?}: name one of {}", names.join(", "));
                 checker.at(&format!("{path}.joint"), message)
             })

@@ -86,7 +86,7 @@ impl Clearance {
         let way = nearest.position - nearest.surface;
         // The surface of the node is nearer than its middle by the radius.
         let motion = way - node.radius * way.normalize_or_zero();
-        Self { q: q.to_vec(), link: model.chain.joints[node.link].name.clone(), nearest, motion }
+        Self { q: q.to_vec(), link: model.chain.links[node.link].spec.name.clone(), nearest, motion }
     }
 }
 

@@ -22,8 +22,7 @@ use crate::{
     JointVector, MAX_AXES,
     contact::{Model, Proximity},
     dataset::{Axis, Grid},
-    proxy::Chain,
-    scene::{JointKind, JointSpec},
+    proxy::{Chain, Link},
 };
 use rayon::prelude::*;
 use std::{
@@ -219,7 +218,7 @@ impl Block {
 
 /// Bounds on how far joints move nodes.
 struct JacobianBounds {
-    /// r_ij, joint fastest (m/rad, or 1).
+    /// r_ij of every link, link fastest (m/rad, or 1).
     bounds: Vec<JointVector>,
     /// Greatest of each joint.
     greatest: JointVector,
@@ -235,18 +234,14 @@ impl JacobianBounds {
             [axis.coordinate(0) - far, axis.last() + far]
         };
         let ranges: Vec<[f64; 2]> = grid.axes.iter().map(range).collect();
-        let bounds = chain.jacobian_bounds(&ranges);
         let mut greatest = JointVector::zeros(chain.joints.len());
-        for bound in &bounds {
+        for bound in &chain.jacobian_bounds(&ranges) {
             greatest.iter_mut().zip(bound.iter()).for_each(|(greatest, r)| *greatest = greatest.max(*r));
         }
-        let slide = |(joint, range): (&JointSpec, &[f64; 2])| match joint.kind {
-            JointKind::Revolute => joint.origin.length(),
-            JointKind::Prismatic => joint.origin.length() + range[0].abs().max(range[1].abs()),
-        };
+        let length = |link: &Link| link.spec.origin.length() + link.slide(&ranges);
         let farthest = chain.nodes.iter().map(|node| node.position.length()).fold(0.0, f64::max);
-        let length = chain.joints.iter().zip(&ranges).map(slide).sum::<f64>() + farthest;
-        Self { bounds, greatest, length }
+        let length = chain.links.iter().map(length).sum::<f64>() + farthest;
+        Self { bounds: chain.link_bounds(&ranges), greatest, length }
     }
 }
 
@@ -317,16 +312,15 @@ impl FreeSpace<'_> {
     /// Returns how far a node moves at most, within the block of half-widths `wide` around the configuration placed
     /// last.
     fn motion(&self, proximity: &Proximity<'_>, node: usize, wide: &JointVector) -> f64 {
-        let link = self.model.chain.nodes[node].link;
-        (0..=link).map(|j| self.slope(proximity, node, j, wide) * wide[j]).sum()
+        (0..wide.len()).map(|j| self.slope(proximity, node, j, wide) * wide[j]).sum()
     }
 
     /// Greatest slope of any node in each joint.
     fn slopes(&self, proximity: &Proximity<'_>, wide: &JointVector) -> JointVector {
         let mut slopes = JointVector::zeros(wide.len());
-        for (node, at) in self.model.chain.nodes.iter().enumerate() {
-            for j in 0..=at.link {
-                slopes[j] = slopes[j].max(self.slope(proximity, node, j, wide));
+        for node in 0..self.model.chain.nodes.len() {
+            for (j, slope) in slopes.iter_mut().enumerate() {
+                *slope = slope.max(self.slope(proximity, node, j, wide));
             }
         }
         slopes
@@ -334,10 +328,17 @@ impl FreeSpace<'_> {
 
     /// m_ij over the block of half-widths `wide` around the configuration placed last.
     fn slope(&self, proximity: &Proximity<'_>, node: usize, joint: usize, wide: &JointVector) -> f64 {
-        let bounds = &self.jacobians.bounds[node];
+        let (bounds, links) = (&self.jacobians.bounds[node], &self.model.chain.links);
         let here = self.model.chain.jacobian_column(proximity.pose(), node, joint).length();
-        let turn: f64 = wide.iter().enumerate().map(|(k, h)| bounds[joint.max(k)] * h).sum();
-        bounds[joint].min(here + turn)
+        let (mut most, mut turn) = (0.0, 0.0);
+        for (a, link) in links.iter().enumerate().filter(|(_, link)| link.joint == joint) {
+            let factor = link.multiplier.abs();
+            most += factor * bounds[a];
+            let turned =
+                links.iter().enumerate().map(|(b, by)| bounds[a.max(b)] * by.multiplier.abs() * wide[by.joint]);
+            turn += factor * turned.sum::<f64>();
+        }
+        most.min(here + turn)
     }
 
     /// Notes lower bounds of the gaps of a free block, whose centre has the gap `gap`.

@@ -143,7 +143,7 @@ impl<'a> Sweep<'a> {
             lowest: None,
             error: None,
             forecast: None,
-            proxy_nodes: scene.proxy.joints.iter().map(|joint| joint.nodes.len()).sum(),
+            proxy_nodes: scene.proxy.contact_nodes(),
         })
     }
 

@@ -89,7 +89,7 @@ impl Inspection {
         let pose = solver.pose();
         let proxy_nodes =
             chain.nodes.iter().zip(&pose.nodes).enumerate().map(|(node, (specified, &position))| ProxyNode {
-                link: chain.joints[specified.link].name.clone(),
+                link: chain.links[specified.link].spec.name.clone(),
                 position,
                 jacobian: (0..chain.joints.len()).map(|joint| chain.jacobian_column(pose, node, joint)).collect(),
                 contact: equilibrium.touches.iter().find(|touch| touch.proxy_node as usize == node).map(|touch| {

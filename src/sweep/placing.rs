@@ -67,7 +67,7 @@ impl Placing {
     /// # Errors
     /// When the object is refused.
     pub fn new(scene: &Scene, wanted: Option<DVec3>) -> Result<Option<Self>, Error> {
-        if scene.proxy.joints.iter().all(|joint| joint.nodes.is_empty()) {
+        if scene.proxy.contact_nodes() == 0 {
             return Ok(None);
         }
         check_axes(scene)?;
@@ -168,7 +168,7 @@ impl Placing {
         Ok(Self {
             body,
             centre: scene.object.shape.centre(),
-            link: chain.joints[chain.nodes[tip].link].name.clone(),
+            link: chain.links[chain.nodes[tip].link].spec.name.clone(),
             tip,
             at: pose.nodes[tip],
             point,

@@ -143,7 +143,7 @@ impl SceneView {
         (self.pose, self.ghost) = (chain.new_pose(), chain.new_pose());
         chain.pose(&loaded.start(), &mut self.pose);
         // Without memory for them on the device, the arm is drawn from joint to joint.
-        self.links = Links::new(&self.context, &loaded.setup.scene.shapes, chain.joints.len()).unwrap_or_default();
+        self.links = Links::new(&self.context, &loaded.setup.scene.shapes, chain.links.len()).unwrap_or_default();
         let object = loaded.setup.object.iter().flat_map(|object| &object.rest);
         let points: Vec<DVec3> = object.chain(&self.pose.nodes).chain(&self.pose.origins).copied().collect();
         let least = points.iter().copied().reduce(DVec3::min).unwrap_or(DVec3::ZERO);

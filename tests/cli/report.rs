@@ -18,8 +18,8 @@ use haptize::{
     },
     report::{self},
     scene::{
-        GroundNodes, GroundSpec, GroundStiffness, JointKind, JointSpec, Material, ObjectSpec, Shape, SpringKind,
-        SpringSpec,
+        GroundNodes, GroundSpec, GroundStiffness, JointKind, JointSpec, Material, ObjectSpec, ProxySpec, Shape,
+        SpringKind, SpringSpec,
     },
 };
 use resvg::{
@@ -48,6 +48,7 @@ pub fn sphere() -> Object {
 pub fn arm(joints: usize) -> Chain {
     let length = 0.3 / (joints.max(2) - 1) as f64;
     let joint = |number: usize| JointSpec {
+        follows: None,
         name: ["base", "shoulder", "elbow", "wrist", "hand", "finger"][number].to_owned(),
         kind: JointKind::Revolute,
         origin: match number {
@@ -70,7 +71,8 @@ pub fn arm(joints: usize) -> Chain {
         length: 0.0,
     };
     let nodes = (joints.saturating_sub(2)..joints).flat_map(|link| (1..=5).map(move |k| node(link, k)));
-    Chain { joints: (0..joints).map(joint).collect(), nodes: nodes.collect() }
+    let joints = (0..joints).map(joint).collect();
+    Chain { nodes: nodes.collect(), ..Chain::new(&ProxySpec { joints, ..Default::default() }) }
 }
 
 /// Forces of independent springs on nodes near each buried proxy node, and the torque they make.

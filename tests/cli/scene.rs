@@ -170,6 +170,34 @@ fn default_gains_meet_the_passivity_conditions() {
 }
 
 #[test]
+fn a_follower_narrows_the_range_of_the_joint_that_it_follows_and_follows_no_follower() {
+    let with = |follows: &str| {
+        let joint = "[[proxy.joint]]\nkind = \"prismatic\"\naxis = [1, 0, 0]\nlimits = [0, 0.1]";
+        LEAST.replace("[contact]", &format!("{joint}\nfollows = {{ {follows} }}\n[contact]"))
+    };
+    let proxy = parse(&with("joint = \"q1\", multiplier = -0.25, offset = 0.05")).unwrap().proxy;
+    assert_eq!((proxy.joints.len(), proxy.joints[0].limits), (1, [-0.2, 0.2]));
+    let [follower] = &proxy.followers[..] else { panic!("{proxy:?}") };
+    assert_eq!((follower.leader, follower.link, follower.spec.rotor_inertia), (0, 1, 0.0));
+    for (follows, words) in [
+        ("joint = \"q9\"", "no joint \"q9\" that moves independently: name one of q1"),
+        ("joint = \"q2\"", "no joint \"q2\" that moves independently"),
+        ("joint = \"q1\", multiplier = 0", "multiplier is 0"),
+        ("joint = \"q1\", multiplier = inf", "finite"),
+        ("joint = \"q1\", offset = 3", "widen limits"),
+        ("joint = \"q1\", factor = 3", "unknown field `factor`"),
+        ("multiplier = 2", "missing field `joint`"),
+    ] {
+        let text = with(follows);
+        let (error, (line, _)) = refused(&text);
+        assert!(text.lines().nth(line - 1).unwrap().starts_with("follows"), "{error}");
+        assert!(error.to_string().contains(words), "{follows}: {error}");
+    }
+    let alone = LEAST.replace("limits = [-1, 1]", "limits = [-1, 1]\nfollows = { joint = \"q1\" }");
+    assert!(refused(&alone).0.to_string().contains("let one joint follow none"));
+}
+
+#[test]
 fn lines_of_nodes_include_both_ends() {
     let text =
         LEAST.replace("{ at = [0.1, 0, 0] }", "{ from = [0, 0, 0], to = [0, 0, 0.3], count = 4, radius = 0.01 }");

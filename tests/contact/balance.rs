@@ -247,7 +247,10 @@ fn soft_balls_rest_deep_in_their_dents() {
 #[test]
 fn chains_of_one_and_six_joints_work() {
     let object = sphere(SpringKind::Isotropic);
-    let one = Chain::new(&haptize::scene::ProxySpec { joints: arm(0.0).joints.split_off(1)[..1].to_vec() });
+    let one = Chain::new(&haptize::scene::ProxySpec {
+        joints: arm(0.0).joints.split_off(1)[..1].to_vec(),
+        ..Default::default()
+    });
     let mut sequence = Random::new(5);
     let turns: Vec<Vec<f64>> = (0..40).map(|_| vec![sequence.between(-0.3, 0.4)]).collect();
     let (touching, converged) = check(&object, &one, 500.0, &turns);

@@ -9,7 +9,8 @@ use haptize::{
     object::Object,
     proxy::Chain,
     scene::{
-        ContactLaw, ContactSpec, GroundStiffness, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape, SpringKind,
+        ContactLaw, ContactSpec, Follows, GroundStiffness, JointKind, ObjectSpec, ProxyNodeSpec, ProxySpec, Shape,
+        SpringKind,
     },
 };
 
@@ -69,7 +70,18 @@ pub fn arm(radius: f64) -> ProxySpec {
             joint(JointKind::Revolute, DVec3::ZERO, DVec3::Y, row(0.03, 0.15, 12, radius)),
             joint(JointKind::Revolute, DVec3::X * 0.16, DVec3::Y, row(0.01, 0.13, 13, radius)),
         ],
+        ..Default::default()
     }
+}
+
+/// [`arm`] with a slide before its elbow, both of which follow its shoulder: two coordinates move four links.
+pub fn arm_of_followers() -> ProxySpec {
+    let mut joints = arm(0.0).joints;
+    joints.insert(2, joint(JointKind::Prismatic, DVec3::ZERO, DVec3::X, row(0.1, 0.15, 3, 0.0)));
+    joints.iter_mut().zip(["turn", "lift", "slide", "bend"]).for_each(|(joint, name)| joint.name = name.into());
+    let follows = |multiplier, offset| Some(Follows { joint: "lift".into(), multiplier, offset });
+    (joints[2].follows, joints[3].follows) = (follows(-0.03, 0.004), follows(0.8, 0.25));
+    ProxySpec::new(joints).unwrap()
 }
 
 /// An arm of six joints, the third sliding, that reaches the sphere too.

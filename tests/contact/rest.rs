@@ -1,7 +1,7 @@
 //! Contact with the surface at rest: the torque is the gradient of the energy, on every kind of body, at every
 //! stiffness and depth.
 
-use crate::fixture::{SPHERE_CENTRE, arm, random_configurations, sphere, torus};
+use crate::fixture::{SPHERE_CENTRE, arm, arm_of_followers, random_configurations, sphere, torus};
 use crate::rounded::{cuboid, rounded};
 use glam::DVec3;
 use haptize::JointVector;
@@ -72,6 +72,9 @@ fn bodies_of_all_kinds(count: usize) -> [Sample; 4] {
 
 fn samples() -> Vec<Sample> {
     let mut samples = Vec::from(bodies_of_all_kinds(24));
+    let places = random_configurations(7, 24).into_iter().map(|q| q[..2].to_vec()).collect();
+    let chain = Chain::new(&arm_of_followers());
+    samples.push(Sample { name: "followers", object: sphere(SpringKind::Isotropic), chain, places });
     samples.extend([shipped("mesh", 60), shipped("touch", 8000), shipped("organ", 200)]);
     samples
 }

@@ -13,13 +13,14 @@ use haptize::{
         Watchdog,
     },
     proxy::{Chain, Node},
-    scene::{DeviceSpec, HandSpec, JointKind, JointSpec, Waypoint},
+    scene::{DeviceSpec, HandSpec, JointKind, JointSpec, ProxySpec, Waypoint},
 };
 use std::sync::{Arc, Mutex};
 
 /// An arm of three joints: yaw and two pitches, its tip at (0.3, 0, 0) where all are zero.
 pub fn arm() -> Chain {
     let joint = |x: f64, axis: DVec3| JointSpec {
+        follows: None,
         name: String::new(),
         kind: JointKind::Revolute,
         origin: DVec3::new(x, 0.0, 0.0),
@@ -32,7 +33,8 @@ pub fn arm() -> Chain {
         nodes: Vec::new(),
     };
     let tip = Node { link: 2, position: DVec3::new(0.15, 0.0, 0.0), radius: 0.0, length: 0.0 };
-    Chain { joints: vec![joint(0.0, DVec3::Z), joint(0.0, DVec3::Y), joint(0.15, DVec3::Y)], nodes: vec![tip] }
+    let joints = vec![joint(0.0, DVec3::Z), joint(0.0, DVec3::Y), joint(0.15, DVec3::Y)];
+    Chain { nodes: vec![tip], ..Chain::new(&ProxySpec { joints, ..Default::default() }) }
 }
 
 /// A Cartesian device of 100 g in a hand that goes through `way` in space (m).

@@ -16,7 +16,6 @@ use crate::contact::linear::support::{Support, dot};
 use crate::contact::model::Model;
 use crate::joint_matrix::{JointMatrix, add_symmetric};
 use crate::proxy::Pose;
-use crate::scene::JointKind;
 use glam::DVec3;
 
 /// Relative residual of the linear solves behind a tangent d tau/d q (1): the tangent errs by its square, relative to
@@ -46,10 +45,7 @@ pub(super) fn tangent(
             let reaction = springs.resist(row, true, &Variation::translation(-*column)).unwrap_or_default();
             springs.add_reaction(row, &reaction, &mut loads[k]);
             for (l, other) in columns.iter().enumerate().take(k + 1) {
-                let turn = match model.chain.joints[l].kind {
-                    JointKind::Revolute => pose.axes[l].cross(*column),
-                    JointKind::Prismatic => DVec3::ZERO,
-                };
+                let turn = model.chain.node_curvature(pose, node, [k, l]);
                 add_symmetric(&mut tangent, k, l, reaction.point.dot(*other) + force.dot(turn));
             }
         }
@@ -84,9 +80,6 @@ mod tests {
         [contact]
         stiffness_per_length = 1.8e5
         tolerance = 1e-11
-        [grid]
-        axes = [{ start = -0.2, stop = 0.2, count = 3 }, { start = -0.2, stop = 0.2, count = 3 },
-            { start = 0.0, stop = 0.01, count = 3 }]
         [[proxy.joint]]
         kind = "revolute"
         axis = [0.0, 1.0, 0.0]
@@ -112,6 +105,11 @@ mod tests {
     fn the_tangent_is_the_derivative_of_the_torque_and_symmetric() {
         check(SCENE, 100);
         check(&SCENE.replace("[contact]", "[contact]\n        surface = \"smooth\""), 60);
+        // The second joint is where it was, but follows the first.
+        let follows =
+            "limits = [-4.0, 4.0]\n        follows = { joint = \"q1\", multiplier = -1.6666, offset = 0.1166 }\n";
+        let (before, after) = SCENE.rsplit_once("limits = [-4.0, 4.0]\n").unwrap();
+        check(&format!("{before}{follows}{after}"), 40);
     }
 
     /// Compares the tangents of a scene with differences; at least `count` of them.
@@ -125,7 +123,11 @@ mod tests {
         let (mut checked, mut contacts) = (0, 0);
         for turn in 0..5 {
             for depth in 0..5 {
-                let q = [0.03 * f64::from(turn) - 0.05, 0.2 - 0.05 * f64::from(turn), 0.0021 * f64::from(depth)];
+                let mut q =
+                    vec![0.03 * f64::from(turn) - 0.05, 0.2 - 0.05 * f64::from(turn), 0.0021 * f64::from(depth)];
+                if chain.joints.len() < 3 {
+                    q.remove(1);
+                }
                 let here = solver.solve(&q);
                 if here.status != Status::Contact {
                     assert!(here.tangent.is_none());
@@ -133,12 +135,12 @@ mod tests {
                 }
                 let tangent = here.tangent.unwrap();
                 let pressing = |solver: &mut Solver<'_>, l: usize, step: f64| {
-                    let mut moved = q;
+                    let mut moved = q.clone();
                     moved[l] += step;
                     solver.solve(&moved)
                 };
                 let size = lower(&tangent, q.len()).fold(0.0_f64, |size, entry| size.max(entry.abs()));
-                for l in 0..3 {
+                for l in 0..q.len() {
                     let (after, before) = (pressing(&mut solver, l, STEP), pressing(&mut solver, l, -STEP));
                     // At a kink, where contacts come and go or a closest feature changes, there is no derivative.
                     let touched = |e: &crate::contact::Equilibrium| {
@@ -153,7 +155,7 @@ mod tests {
                     if touched(&after) != touched(&before) {
                         continue;
                     }
-                    for k in 0..3 {
+                    for k in 0..q.len() {
                         // The potential's own gradient: tau = -dU/dq.
                         let force = (before.energy - after.energy) / (2.0 * STEP);
                         assert!((force - here.torque[l]).abs() < 1e-5 * size, "{q:?} {l}: {force} {:?}", here.torque);

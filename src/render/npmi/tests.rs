@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     proxy::Chain,
     random::Random,
-    scene::{JointKind, JointSpec},
+    scene::{JointKind, JointSpec, ProxySpec},
 };
 use glam::{DMat3, DVec3};
 
@@ -213,6 +213,7 @@ fn impossible_proxies_are_refused() {
 /// An arm of `count` links whose inertia varies strongly with its posture.
 fn arm(count: usize, limits: [f64; 2]) -> Chain {
     let joint = |k: usize| JointSpec {
+        follows: None,
         name: format!("q{k}"),
         kind: if k == 4 { JointKind::Prismatic } else { JointKind::Revolute },
         origin: DVec3::new(if k == 0 { 0.0 } else { 0.3 }, 0.02 * k as f64, 0.0),
@@ -224,7 +225,7 @@ fn arm(count: usize, limits: [f64; 2]) -> Chain {
         rotor_inertia: 1e-4,
         nodes: Vec::new(),
     };
-    Chain { joints: (0..count).map(joint).collect(), nodes: Vec::new() }
+    Chain::new(&ProxySpec { joints: (0..count).map(joint).collect(), ..Default::default() })
 }
 
 #[test]

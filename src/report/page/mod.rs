@@ -102,7 +102,7 @@ impl Body {
     fn rods(&self, is_plain: impl Fn(usize) -> bool, thickness: f64) -> Vec<(Cone, [(usize, DVec3); 2])> {
         let (chain, pose) = (&self.chain, &self.instants[0].pose);
         let mut rods = Vec::new();
-        for link in (0..chain.joints.len()).filter(|link| is_plain(*link)) {
+        for link in (0..chain.links.len()).filter(|link| is_plain(*link)) {
             let joint = |end: &DVec3| link + usize::from(pose.origins.get(link + 1) == Some(end));
             let links = solid::links(chain, pose, |other| other == link, thickness, LINK);
             rods.extend(links.into_iter().map(|cone| (cone, cone.ends.map(|end| (joint(&end), end)))));
@@ -135,7 +135,7 @@ impl Body {
         let shapes: &[_] = if count > MOST_TRIANGLES { &[] } else { shapes };
         let is_plain = |link: usize| !shapes.iter().any(|(joint, _)| *joint == Some(link));
         let poses = instants.iter().flat_map(|instant| {
-            (0..chain.joints.len()).flat_map(|joint| shape_frame(Some(joint), &instant.pose).to_cols_array())
+            (0..chain.links.len()).flat_map(|joint| shape_frame(Some(joint), &instant.pose).to_cols_array())
         });
         let rods = self.rods(is_plain, LINK_THICKNESS * radius);
         let place = |(joint, end): &(usize, DVec3)| {

@@ -226,7 +226,52 @@ fn a_joint_that_follows_one_beside_the_chain_moves_by_itself() {
     let (_, followed) = arm(&follows("camera_tilt"), "probe", &[]).unwrap();
     assert_eq!(followed.joints.len(), 4);
     assert!(followed.notes.iter().any(|note| note.message.contains("follows \"camera_tilt\"")), "{:?}", followed.notes);
-    assert!(arm(&follows("yaw"), "probe", &[]).is_err());
+}
+
+/// The tool of a palletiser stays level, in URDF and in MJCF: two coordinates move three links.
+#[test]
+fn a_joint_that_follows_one_of_the_chain_moves_with_it() {
+    for name in ["palletiser.urdf", "palletiser.xml"] {
+        let (robot, arm) = arm(&std::fs::read_to_string(file(name)).unwrap(), "tool", &[]).unwrap();
+        let nodes = sample(&robot, &arm, Some(0.02), None).unwrap();
+        let text = write_scene(&robot, &arm, &nodes, &[], "haptize import").unwrap();
+        let scene = Scene::parse(&text, "palletiser.toml").unwrap();
+        let names: Vec<&str> = scene.proxy.joints.iter().map(|joint| joint.name.as_str()).collect();
+        assert_eq!((names, scene.grid.axes.len()), (vec!["yaw", "lift"], 2), "{name}");
+        // By its own limits the tool lets the beam go from 0.1 - 2 to 0.1 + 0.5.
+        assert_eq!(scene.proxy.joints[1].limits, [-1.0, 0.6], "{name}");
+        let chain = Chain::new(&scene.proxy);
+        for [yaw, lift] in [[0.0, 0.0], [0.7, -0.9], [-1.4, 0.55]] {
+            let pose = posed(&chain, &[yaw, lift]);
+            let turned = DMat3::from_rotation_z(yaw);
+            let level = turned * DMat3::from_rotation_y(0.1);
+            let end = DVec3::new(0.05, 0.0, 0.2) + DMat3::from_rotation_y(lift) * DVec3::X * 0.2;
+            assert!((pose.rotations[2] - level).to_cols_array().iter().all(|x| x.abs() < 1e-15), "{name}");
+            assert!(pose.origins[2].distance(turned * end) < 1e-15, "{name}");
+        }
+    }
+}
+
+/// Of two joints that follow one beside the chain, the outer follows the inner; one that follows by no multiple is held.
+#[test]
+fn joints_that_follow_the_same_one_move_together() {
+    let text = std::fs::read_to_string(file("arm.urdf")).unwrap();
+    let (bend, roll) =
+        ("<limit lower=\"-1.2\" upper=\"1.5\" effort=\"5\" velocity=\"3\"/>", "<limit lower=\"-1\" upper=\"1\"/>");
+    let with = |of_bend: &str, of_roll: &str| {
+        let mimic = |limits: &str, of: &str| format!("{limits}<mimic joint={of}/>");
+        text.replace(bend, &mimic(bend, of_bend)).replace(roll, &mimic(roll, of_roll))
+    };
+    let camera = "\"camera_tilt\" multiplier=\"-2\" offset=\"0.1\"";
+    let (_, together) = arm(&with(camera, "\"camera_tilt\" offset=\"0.5\""), "probe", &[]).unwrap();
+    let mimic = together.joints[3].follows.as_ref().unwrap();
+    // roll = camera + 0.5, and camera = (bend - 0.1) / -2.
+    assert_eq!((mimic.joint.as_str(), mimic.multiplier), ("bend", -0.5));
+    assert!((mimic.offset - 0.55).abs() < 1e-15 && together.joints[2].follows.is_none());
+    let held = arm(&with("\"lift\" multiplier=\"0\" offset=\"0.3\"", "\"bend\""), "probe", &[]).unwrap().1;
+    assert_eq!(held.joints.len(), 2);
+    let circle = arm(&with("\"roll\"", "\"bend\""), "probe", &[]).unwrap_err();
+    assert!(circle.to_string().contains("follows itself"), "{circle}");
 }
 
 /// A joint that follows a locked one, and one that follows that in turn, are where the file's affine functions put them.

@@ -1,6 +1,10 @@
 //! Equilibria of the GPU backend against the CPU's.
 
 use super::fixture::{context, load, load_of, on_grid};
+use crate::{
+    fixture::{arm_of_followers, random_configurations, sphere},
+    rest::contact,
+};
 use glam::DVec3;
 use haptize::{
     JointVector,
@@ -141,6 +145,18 @@ fn all_scenes_have_the_same_equilibria_on_gpu_and_cpu() {
         let what = format!("{name}, {surface:?}, {} a node", model.compliance.rows_per_node);
         check(&what, &model, &configurations, 20);
     }
+}
+
+/// The kernel moves links, whose torques and tangents are gathered by the joints that move them.
+#[test]
+fn joints_that_follow_others_have_the_same_equilibria_on_gpu_and_cpu() {
+    let object = sphere(SpringKind::Isotropic);
+    let chain = Chain::new(&arm_of_followers());
+    let mut model = Model::new(&object, &chain, contact(1e3));
+    model.with_tangent = true;
+    let configurations = random_configurations(7, 60);
+    let configurations: Vec<_> = configurations.iter().map(|q| JointVector::from_slice(&q[..2])).collect();
+    check("followers", &model, &configurations, 20);
 }
 
 /// In stiff contact the matrix of the program is nearly singular where nodes are closer than the body resolves.

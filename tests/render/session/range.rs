@@ -101,9 +101,10 @@ fn the_proxy_leaves_the_grid_where_space_is_free_and_nowhere_else() {
 fn beyond_a_measured_range_a_free_border_is_free_and_one_in_contact_holds() {
     // No gaps: steps from contact count. The half space fills the upper half of the grid.
     let data = half_space_of(2);
-    let mut chain = Chain { joints: Vec::new(), nodes: Vec::new() };
     let setup = Scene::load(concat!(env!("CARGO_MANIFEST_DIR"), "/datasets/sphere.toml")).unwrap();
-    chain.joints = Chain::new(&setup.proxy).joints[..2].to_vec();
+    let joints = setup.proxy.joints[..2].to_vec();
+    let mut chain =
+        Chain { nodes: Vec::new(), ..Chain::new(&haptize::scene::ProxySpec { joints, ..Default::default() }) };
     chain.joints.iter_mut().for_each(|joint| joint.limits = [-3.0, 3.0]);
     let range = HaptizedRange::new(&data, &chain).unwrap();
     let haptics = build(&data, &haptics(2)).with_range(range);

@@ -19,7 +19,6 @@ use crate::contact::linear::{cholesky, support::dot};
 use crate::contact::model::Model;
 use crate::joint_matrix::{JointMatrix, add_symmetric};
 use crate::proxy::Pose;
-use crate::scene::JointKind;
 use glam::{DMat3, DVec3};
 
 /// Step of the differences of the depth's gradient, over the mean edge (1). The gradient bends over an edge, or over
@@ -95,10 +94,7 @@ impl RestProgram {
             };
             for k in 0..joints {
                 for l in 0..=k {
-                    let turn = match model.chain.joints[l].kind {
-                        JointKind::Revolute => pose.axes[l].cross(columns[k]),
-                        JointKind::Prismatic => DVec3::ZERO,
-                    };
+                    let turn = model.chain.node_curvature(pose, node, [k, l]);
                     let bent = columns[l].dot(bend * columns[k]);
                     add_symmetric(&mut tangent, k, l, force.dot(turn) - row.multiplier * bent);
                 }

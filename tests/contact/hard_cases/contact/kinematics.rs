@@ -46,10 +46,10 @@ pub fn run(setting: &Setting) -> Result<Vec<CaseResult>, Failure> {
         ("stretched out, singular", stretched, |q| vec![q, 0.0, 0.0]),
         ("beyond its limits", limited, |q| vec![q]),
     ];
-    let reference = Chain::new(&ProxySpec { joints: plain });
+    let reference = Chain::new(&ProxySpec { joints: plain, ..Default::default() });
     let mut outcomes = Vec::new();
     for (name, joints, posture) in arms {
-        let arm = Chain::new(&ProxySpec { joints });
+        let arm = Chain::new(&ProxySpec { joints, ..Default::default() });
         let postures = angles.map(|q| JointVector::from_slice(&posture(q)));
         for mut processor in processors(setting) {
             let mut worst = 0.0f64;

@@ -196,6 +196,7 @@ fn slivers(mut processor: Processor<'_>) -> Result<CaseResult, Failure> {
                 joint(JointKind::Prismatic, DVec3::Z * (0.5 * size + radius), -DVec3::Z, vec![]),
                 joint(JointKind::Prismatic, DVec3::ZERO, DVec3::X, nodes),
             ],
+            ..Default::default()
         });
         let model = Model::new(&object, &chain, contact(1e3));
         let h = 1e-7;

@@ -94,6 +94,7 @@ fn arm(base: DVec3, radius: f64) -> Chain {
             joint(JointKind::Prismatic, base, -DVec3::Z, vec![]),
             joint(JointKind::Revolute, DVec3::ZERO, DVec3::Y, nodes),
         ],
+        ..Default::default()
     })
 }
 
