@@ -44,7 +44,7 @@ pub(super) fn sampled<'a>(
 
 /// Configurations that stand for the region of `scene`, whose `model` may know no compliance: spread over it, all points
 /// of a grid that has few, and, where contact is rare among them, random ones in contact.
-pub(super) fn sample(scene: &Scene, model: &Model<'_>) -> Vec<JointVector> {
+pub fn sample(scene: &Scene, model: &Model<'_>) -> Vec<JointVector> {
     let (mut configurations, is_all) = spread(scene);
     if is_all {
         return configurations;
