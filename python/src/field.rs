@@ -27,8 +27,8 @@ use std::{path::PathBuf, sync::OnceLock};
 /// so, with fill_value torque, energy, gap and gradient are that number there.
 ///
 /// Each look-up takes a configuration q (rad; m), an array of one entry per joint, or any array of such in its last
-/// axis, and works on all cores; Ctrl-C ends it. Wrong shapes and numbers that are not finite raise ValueError. Threads may share a
-/// field.
+/// axis, and works on all cores; Ctrl-C ends it. Wrong shapes and numbers that are not finite raise ValueError. Threads
+/// may share a field.
 #[pyclass(frozen, module = "haptize")]
 pub struct Field {
     field: TorqueField,

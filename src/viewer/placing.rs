@@ -10,7 +10,7 @@ use crate::{
     object::{Object, corners},
     proxy::tip,
     scene::{Scene, SceneText, Shape, rotation},
-    sweep::Placing,
+    sweep::{Placing, build_object},
 };
 use eframe::egui::{DragValue, Response, RichText, Ui};
 use glam::{DAffine3, DVec3};
@@ -148,7 +148,7 @@ pub fn edited(scene: &Scene, edit: &Edit) -> Result<(Scene, Option<JointVector>)
     let no_node = || Error::from("the arm has no contact node");
     let q = match edit {
         Edit::Move(motion, angles) => {
-            let object = Object::build(&scene.object)?;
+            let object = build_object(scene)?;
             let (about, surface) = (middle(&object), &object.rest[..object.surface_nodes]);
             if let Shape::Mesh { placement, .. } | Shape::Tetrahedra { placement, .. } = &scene.object.shape {
                 let turned = rotation(*angles) * rotation(placement.turn).inverse();

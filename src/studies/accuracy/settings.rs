@@ -16,7 +16,10 @@ use crate::{
     object::Object,
     proxy::Chain,
     scene::{ContactLaw, ContactSpec, GroundSpec, GroundStiffness, Scene, Shape, SkinSpec},
-    sweep::reference::{Reference, equilibria},
+    sweep::{
+        build_object,
+        reference::{Reference, equilibria},
+    },
 };
 use toml::{Table, Value};
 
@@ -73,7 +76,7 @@ pub(super) fn compare(
     let scenes: Vec<&Scene> = variants.iter().map(|variant| &variant.scene).chain([own]).collect();
     let built: Vec<(Object, Chain)> = scenes
         .iter()
-        .map(|scene| Ok((Object::build(&scene.object)?, Chain::new(&scene.proxy))))
+        .map(|scene| Ok((build_object(scene)?, Chain::new(&scene.proxy))))
         .collect::<Result<_, Error>>()?;
     let models: Vec<Model<'_>> = scenes
         .iter()
