@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     JointVector, MAX_AXES, contact,
-    proxy::{Chain, Link},
+    proxy::{Chain, ChainLink},
     scene::JointKind,
 };
 use bytemuck::Zeroable;
@@ -199,7 +199,7 @@ impl Device for RestDevice {
         let lane = &mut self.lanes[lane];
         let count = section.len();
         // (cos q, sin q) of every link, or (q, 0) of a prismatic one: all that kinematics needs.
-        let motion = |link: &Link, q: f64| match link.spec.kind {
+        let motion = |link: &ChainLink, q: f64| match link.spec.kind {
             JointKind::Revolute => [q.cos() as f32, q.sin() as f32],
             JointKind::Prismatic => [q as f32, 0.0],
         };

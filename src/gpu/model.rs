@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     MAX_AXES, contact,
-    proxy::{Chain, Link},
+    proxy::{Chain, ChainLink},
     scene::{ContactLaw, JointKind},
 };
 use glam::DVec3;
@@ -198,7 +198,7 @@ fn reach(chain: &Chain, centre: DVec3) -> f64 {
 /// share of stiffness of each proxy node.
 fn chain(model: &contact::Model<'_>) -> Vec<f32> {
     let mut numbers = Vec::new();
-    for (k, Link { spec: joint, .. }) in model.chain.links.iter().enumerate() {
+    for (k, ChainLink { spec: joint, .. }) in model.chain.links.iter().enumerate() {
         let origin = if k == 0 { joint.origin - model.surface.centre } else { joint.origin };
         numbers.extend(origin.to_array());
         numbers.extend(joint.axis.to_array());

@@ -1,6 +1,6 @@
 //! The chain and its forward kinematics.
 
-use super::Link;
+use super::ChainLink;
 use crate::JointVector;
 use crate::scene::{JointSpec, ProxyNodeSpec, ProxySpec};
 use glam::{DMat3, DVec3};
@@ -11,7 +11,7 @@ pub struct Chain {
     /// Those that move independently, from the base outwards: a configuration has one coordinate for each.
     pub joints: Vec<JointSpec>,
     /// All joints, those that follow others included, from the base outwards.
-    pub links: Vec<Link>,
+    pub links: Vec<ChainLink>,
     /// Contact nodes of all links, link by link.
     pub nodes: Vec<Node>,
 }
@@ -46,7 +46,7 @@ impl Chain {
     /// The chain of a validated scene.
     #[must_use]
     pub fn new(spec: &ProxySpec) -> Self {
-        let links: Vec<Link> = spec.links().into_iter().map(|(joint, spec)| Link::new(joint, spec)).collect();
+        let links: Vec<ChainLink> = spec.links().into_iter().map(|(joint, spec)| ChainLink::new(joint, spec)).collect();
         let nodes = links.iter().enumerate().flat_map(|(link, joint)| {
             let node = move |node: &ProxyNodeSpec| Node {
                 link,
@@ -74,8 +74,8 @@ impl Chain {
         pose
     }
 
-    /// Places the chain at configuration `q`, one number per independent joint; missing ones count as zero. Allocates only where
-    /// `pose` does not have the chain's size yet.
+    /// Places the chain at configuration `q`, one number per independent joint; missing ones count as zero. Allocates
+    /// only where `pose` does not have the chain's size yet.
     pub fn pose(&self, q: &[f64], pose: &mut Pose) {
         let links = self.links.len();
         pose.origins.resize(links, DVec3::ZERO);

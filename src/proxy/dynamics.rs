@@ -13,7 +13,7 @@
 //! The Christoffel matrix is `C_ij = 1/2 sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) v_k`: its symmetric part is half
 //! of `Mdot`, its skew part `1/2 (W - W^T)` with `W_ij = sum_k dM_ik/dq_j v_k`.
 
-use super::{Chain, Link, Links};
+use super::{Chain, ChainLink, Links};
 use crate::scene::JointKind;
 use crate::{JointMatrix, MAX_JOINTS};
 use glam::{DMat3, DVec3};
@@ -114,7 +114,7 @@ impl Chain {
 
     fn twists(&self, links: &Links) -> [Spatial; MAX_JOINTS] {
         let mut twists = [Spatial { angular: DVec3::ZERO, linear: DVec3::ZERO }; MAX_JOINTS];
-        for (index, Link { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS) {
+        for (index, ChainLink { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS) {
             let axis = links.axes[index];
             twists[index] = match joint.kind {
                 JointKind::Revolute => Spatial { angular: axis, linear: links.origins[index].cross(axis) },
@@ -128,7 +128,7 @@ impl Chain {
     fn composite_inertias(&self, links: &Links) -> [Inertia; MAX_JOINTS] {
         let mut sum = Inertia { mass: 0.0, first: DVec3::ZERO, second: DMat3::ZERO };
         let mut composite = [sum; MAX_JOINTS];
-        for (index, Link { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS).rev() {
+        for (index, ChainLink { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS).rev() {
             let rotation = links.rotations[index];
             let centre = links.origins[index] + rotation * joint.centre_of_mass;
             let outer = DMat3::from_cols(centre.x * centre, centre.y * centre, centre.z * centre);

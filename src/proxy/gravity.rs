@@ -1,6 +1,6 @@
 //! Torque of gravity on the chain.
 
-use super::{Chain, Link, Pose};
+use super::{Chain, ChainLink, Pose};
 use crate::JointVector;
 use glam::DVec3;
 
@@ -10,7 +10,7 @@ impl Chain {
     #[must_use]
     pub fn gravity_torque(&self, pose: &Pose, gravity: DVec3) -> JointVector {
         let mut torque = JointVector::zeros(self.links.len());
-        for (link, Link { spec: joint, .. }) in self.links.iter().enumerate() {
+        for (link, ChainLink { spec: joint, .. }) in self.links.iter().enumerate() {
             let centre = pose.origins[link] + pose.rotations[link] * joint.centre_of_mass;
             for (i, torque) in torque.iter_mut().enumerate().take(link + 1) {
                 *torque += joint.mass * self.point_velocity(pose, centre, i).dot(gravity);

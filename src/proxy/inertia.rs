@@ -5,7 +5,7 @@
 //! inertia is positive in a validated scene, so that M is positive definite in every configuration, singular arms
 //! included.
 
-use super::{Chain, Link, Pose};
+use super::{Chain, ChainLink, Pose};
 use crate::scene::JointKind;
 use crate::{JointMatrix, MAX_JOINTS};
 use glam::DVec3;
@@ -16,7 +16,7 @@ impl Chain {
     #[must_use]
     pub fn inertia(&self, pose: &Pose) -> JointMatrix {
         let mut inertia = [[0.0; MAX_JOINTS]; MAX_JOINTS];
-        for (link, Link { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS) {
+        for (link, ChainLink { spec: joint, .. }) in self.links.iter().enumerate().take(MAX_JOINTS) {
             inertia[link][link] += joint.rotor_inertia;
             let rotation = pose.rotations[link];
             let centre = pose.origins[link] + rotation * joint.centre_of_mass;
@@ -65,7 +65,7 @@ mod tests {
             let [before, pose, after] = [-STEP, 0.0, STEP].map(|t| random::at(&chain, &q, &rate, t));
             let mut energy = 0.0;
             let rates = chain.link_rates(&rate);
-            for (link, Link { spec: joint, .. }) in chain.links.iter().enumerate() {
+            for (link, ChainLink { spec: joint, .. }) in chain.links.iter().enumerate() {
                 // Velocities by central differences of the link's placement, and the spin from R^T dR/dt = [w] in its
                 // frame.
                 let centre = |pose: &Pose| pose.origins[link] + pose.rotations[link] * joint.centre_of_mass;

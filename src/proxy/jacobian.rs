@@ -112,6 +112,27 @@ mod tests {
     }
 
     #[test]
+    fn curvature_is_the_derivative_of_the_jacobian_and_bounds_are_kept() {
+        for (chain, q, _) in random::chains() {
+            let pose = random::at(&chain, &q, &q, 0.0);
+            let ranges: Vec<[f64; 2]> = q.iter().map(|q| [*q, *q]).collect();
+            let bounds = chain.jacobian_bounds(&ranges);
+            for (joint, other) in (0..q.len()).flat_map(|j| (0..q.len()).map(move |k| (j, k))) {
+                let mut unit = JointVector::zeros(q.len());
+                unit[other] = 1.0;
+                let [before, after] = [-STEP, STEP].map(|t| random::at(&chain, &q, &unit, t));
+                for (node, bound) in bounds.iter().enumerate() {
+                    let column = |pose| chain.jacobian_column(pose, node, joint);
+                    assert!(column(&pose).length() <= bound[joint] + 1e-12);
+                    let difference = (column(&after) - column(&before)) / (2.0 * STEP);
+                    let curvature = chain.node_curvature(&pose, node, [joint, other]);
+                    assert!(difference.distance(curvature) < 1e-9, "{difference} against {curvature}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn torque_does_the_work_of_the_force() {
         let mut random = Random::new(5);
         for (chain, q, rate) in random::chains() {

@@ -18,7 +18,8 @@ pub struct Links {
 }
 
 impl Chain {
-    /// The link frames at configuration `q`, one number per independent joint; missing ones count as zero. Allocates nothing.
+    /// The link frames at configuration `q`, one number per independent joint; missing ones count as zero. Allocates
+    /// nothing.
     #[must_use]
     pub fn links(&self, q: &[f64]) -> Links {
         let mut links = Links {

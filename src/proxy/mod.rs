@@ -26,4 +26,4 @@ pub use links::Links;
 pub(crate) use posture::outer;
 pub use posture::{Posture, of_last_link, tip};
 pub use press::{PRESS_GAP, Press};
-pub use transmission::Link;
+pub use transmission::ChainLink;

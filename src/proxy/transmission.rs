@@ -1,8 +1,8 @@
-//! How the coordinates of a configuration move the links: the one of each is an affine function of the coordinate of
-//! its own joint, or of that of the joint that it follows.
+//! How a configuration moves the links: the coordinate of each is an affine function of that of its own joint, or of
+//! the joint that it follows.
 //!
-//! With the coordinates of all links t = S q + c, which [`Chain::coordinates`] yields, and S constant, efforts and
-//! quadratic forms over the links are S^T t and S^T M S over the joints, by the virtual work.
+//! All together they are S q + c with a constant matrix S. By virtual work, efforts f at the links are torques S^T f of
+//! the independent joints, and a quadratic form M over the links is S^T M S.
 
 use super::Chain;
 use crate::scene::{JointKind, JointSpec};
@@ -10,7 +10,7 @@ use crate::{JointMatrix, JointVector, MAX_JOINTS};
 
 /// A link, and the joint that moves it.
 #[derive(Clone, Debug)]
-pub struct Link {
+pub struct ChainLink {
     /// Its joint.
     pub spec: JointSpec,
     /// Number of the independent joint whose coordinate moves it.
@@ -21,7 +21,7 @@ pub struct Link {
     pub offset: f64,
 }
 
-impl Link {
+impl ChainLink {
     /// The link with the joint `spec`, which the independent joint `joint` moves.
     #[must_use]
     pub fn new(joint: usize, spec: &JointSpec) -> Self {
@@ -47,12 +47,6 @@ impl Link {
 }
 
 impl Chain {
-    /// Coordinates of all links at configuration `q` (rad or m).
-    #[must_use]
-    pub fn coordinates(&self, q: &[f64]) -> JointVector {
-        self.links.iter().map(|link| link.coordinate(q)).collect()
-    }
-
     /// Rates of all links at the joint rates `v` (rad/s or m/s).
     #[must_use]
     pub(super) fn link_rates(&self, v: &[f64]) -> JointVector {

@@ -138,9 +138,9 @@ impl Arm {
 /// Motions of the joints that do not move: identity if fixed, that of its value if locked or if it follows a locked one,
 /// or one by no multiple.
 fn held(robot: &Robot, locks: &[Lock]) -> Result<HashMap<usize, DAffine3>, Error> {
-    let fixed = robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointType::Fixed);
-    let mut held: HashMap<usize, DAffine3> = fixed.map(|(number, _)| (number, DAffine3::IDENTITY)).collect();
-    let mut values: HashMap<&str, f64> = HashMap::new();
+    let fixed = || robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointType::Fixed);
+    let mut held: HashMap<usize, DAffine3> = fixed().map(|(number, _)| (number, DAffine3::IDENTITY)).collect();
+    let mut values: HashMap<&str, f64> = fixed().map(|(_, joint)| (joint.name.as_str(), 0.0)).collect();
     for Lock { joint: name, value } in locks {
         let refuse = |message: String| Err(Error::at(&robot.path, message));
         let Some(number) = robot.joints.iter().position(|joint| joint.name == *name) else {

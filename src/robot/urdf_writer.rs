@@ -3,7 +3,7 @@
 
 use crate::{
     names::Xml,
-    proxy::{Chain, Link},
+    proxy::{Chain, ChainLink},
     scene::{Follows, JointKind},
 };
 use glam::DVec3;
@@ -25,7 +25,7 @@ pub fn description(chain: &Chain, name: &str, base: &str, radius: f64) -> String
 fn describe(out: &mut String, chain: &Chain, name: &str, base: &str, radius: f64) -> std::fmt::Result {
     writeln!(out, "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n  <link name=\"{}\"/>", Xml(name), Xml(base))?;
     let mut parent = base;
-    for (number, Link { spec: joint, .. }) in chain.links.iter().enumerate() {
+    for (number, ChainLink { spec: joint, .. }) in chain.links.iter().enumerate() {
         let kind = match joint.kind {
             JointKind::Revolute => "revolute",
             JointKind::Prismatic => "prismatic",

@@ -22,7 +22,7 @@ use crate::{
     JointVector, MAX_AXES,
     contact::{Model, Proximity},
     dataset::{Axis, Grid},
-    proxy::{Chain, Link},
+    proxy::{Chain, ChainLink},
 };
 use rayon::prelude::*;
 use std::{
@@ -238,7 +238,7 @@ impl JacobianBounds {
         for bound in &chain.jacobian_bounds(&ranges) {
             greatest.iter_mut().zip(bound.iter()).for_each(|(greatest, r)| *greatest = greatest.max(*r));
         }
-        let length = |link: &Link| link.spec.origin.length() + link.slide(&ranges);
+        let length = |link: &ChainLink| link.spec.origin.length() + link.slide(&ranges);
         let farthest = chain.nodes.iter().map(|node| node.position.length()).fold(0.0, f64::max);
         let length = chain.links.iter().map(length).sum::<f64>() + farthest;
         Self { bounds: chain.link_bounds(&ranges), greatest, length }

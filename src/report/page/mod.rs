@@ -165,6 +165,7 @@ impl Body {
             "owners": pack.put(&rods.iter().flat_map(|(_, ends)| ends.map(|(joint, _)| joint as u8)).collect::<Vec<_>>()),
             "radii": pack.put_f32(rods.iter().flat_map(|(cone, _)| cone.radii)),
             "kinds": pack.put(&rods.iter().map(|(cone, _)| u8::from(cone.colour == PROXY_NODE)).collect::<Vec<_>>()),
+            "frames": chain.links.len(),
             "poses": pack.put_f32(poses),
             "links": links,
             "force": force,

@@ -370,7 +370,7 @@ function begin3d() {
         }
         solids.length = 0;
         const { rods, radii, kinds, owners, poses, forces, links, radius } = fromBody;
-        const still = [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0], frames = joints.map((_, joint) => still.map((_, k) => mixed(poses, 12 * joints.length, 12 * joint + k)));
+        const still = [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0], frames = Array.from({ length: body.frames }, (_, link) => still.map((_, k) => mixed(poses, 12 * body.frames, 12 * link + k)));
         const world = (matrix, list, at) => [0, 1, 2].map((axis) => matrix[9 + axis] + matrix[axis] * list[at] + matrix[3 + axis] * list[at + 1] + matrix[6 + axis] * list[at + 2]);
         for (let k = 0; k < kinds.length; k++) {
             const [from, to] = [2 * k, 2 * k + 1].map((end) => world(frames[owners[end]], rods, 3 * end));

@@ -1,19 +1,19 @@
 //! Equilibria of the GPU backend against the CPU's.
 
 use super::fixture::{context, load, load_of, on_grid};
-use crate::{
-    fixture::{arm_of_followers, random_configurations, sphere},
-    rest::contact,
-};
 use glam::DVec3;
 use haptize::{
     JointVector,
     contact::{Equilibrium, Model, Solver, Status},
+    fixtures::Random,
     gpu::{AdapterChoice, BatchCapacity, Context, GpuError, GpuSolver},
     joint_matrix::lower,
     object::{Compliance, Object},
     proxy::Chain,
-    scene::{ContactLaw, ContactSpec, ContactSurface, ElasticSpec, Material, Scene, SpringKind, SpringSpec},
+    scene::{
+        ContactLaw, ContactSpec, ContactSurface, ElasticSpec, Follows, Material, ProxySpec, Scene, SpringKind,
+        SpringSpec,
+    },
     sweep::Backend,
 };
 use std::sync::Arc;
@@ -150,12 +150,20 @@ fn all_scenes_have_the_same_equilibria_on_gpu_and_cpu() {
 /// The kernel moves links, whose torques and tangents are gathered by the joints that move them.
 #[test]
 fn joints_that_follow_others_have_the_same_equilibria_on_gpu_and_cpu() {
-    let object = sphere(SpringKind::Isotropic);
-    let chain = Chain::new(&arm_of_followers());
-    let mut model = Model::new(&object, &chain, contact(1e3));
+    let (scene, object, chain) = load("sphere.toml");
+    let mut joints = chain.joints;
+    // The third joint goes through its range as the second goes through its own.
+    let [turn, lift, bend] = [0, 1, 2].map(|k| joints[k].limits);
+    let multiplier = (bend[1] - bend[0]) / (lift[1] - lift[0]);
+    let offset = bend[0] - multiplier * lift[0];
+    joints[2].follows = Some(Follows { joint: joints[1].name.clone(), multiplier, offset });
+    let chain = Chain::new(&ProxySpec::new(joints).unwrap());
+    let surface = ContactSurface::Smooth;
+    let mut model = Model::new(&object, &chain, ContactSpec { surface, ..scene.contact });
     model.with_tangent = true;
-    let configurations = random_configurations(7, 60);
-    let configurations: Vec<_> = configurations.iter().map(|q| JointVector::from_slice(&q[..2])).collect();
+    let mut random = Random::new(3);
+    let mut place = |[least, greatest]: [f64; 2]| random.between(least, greatest);
+    let configurations: Vec<_> = (0..200).map(|_| [turn, lift].map(&mut place).into_iter().collect()).collect();
     check("followers", &model, &configurations, 20);
 }
 
