@@ -214,7 +214,7 @@ fn several(folder: &Path) {
     }
     let names = ["median", "95 %", "most"];
     let curves = curves.into_iter().zip(names).enumerate();
-    let curves = curves.map(|(number, (points, name))| Curve::new(name, number, points.into_iter())).collect();
+    let curves = curves.map(|(number, (points, name))| Curve::new(name, number, points)).collect();
     let texts = ["Friction of all contacts together over that of each", "contacts with random forces"];
     draw(folder, "memory-several", texts, vec![lane("ratio [1]", curves)]);
 }

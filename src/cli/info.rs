@@ -148,7 +148,7 @@ pub fn inclusions(object: &ObjectSpec) -> Vec<String> {
 fn skin_on(dataset: &Dataset, spec: SkinSpec) -> Option<Skin> {
     let surface = dataset.surface.as_ref()?;
     let (nodes, triangles): (Vec<DVec3>, _) = (surface.places().collect(), surface.facets());
-    Some(Skin::new(spec, &nodes, &triangles))
+    Some(Skin::new(spec, &nodes, triangles))
 }
 
 impl Describe for Info {

@@ -8,7 +8,7 @@
 //! For the eye, `/tf` and `/robot_description` move the arm, `/object` is its surface and `/contact` the forces on the
 //! arm, of each frame.
 
-use super::object::{Extent, FORCE, Instant, instants_at};
+use super::object::{FORCE, Instant, Magnitudes, instants_at};
 use crate::{
     Error, JointVector,
     dataset::Dataset,
@@ -56,7 +56,7 @@ pub struct McapSession<'a> {
 pub struct MovingObject {
     triangles: Vec<[u32; 3]>,
     instants: Vec<Instant>,
-    extent: Extent,
+    magnitudes: Magnitudes,
 }
 
 impl McapSession<'_> {
@@ -68,8 +68,8 @@ impl McapSession<'_> {
         let Self { dataset, chain, trace, live } = *self;
         let Some(surface) = dataset.surface.as_ref().filter(|_| !trace.frames.is_empty()) else { return Ok(None) };
         let instants = instants_at(dataset, chain, trace, trace.frames.iter(), live.cloned())?;
-        let extent = Extent::of(&surface.places().collect::<Vec<_>>(), &instants);
-        Ok(Some(MovingObject { triangles: surface.facets().to_vec(), extent, instants }))
+        let magnitudes = Magnitudes::of(&surface.places().collect::<Vec<_>>(), &instants);
+        Ok(Some(MovingObject { triangles: surface.facets().to_vec(), magnitudes, instants }))
     }
 
     /// Writes the session, whose `object` this is, to `out`; `facts` about it go into the file's metadata.
@@ -190,7 +190,7 @@ impl MovingObject {
         let marker = |form| Marker { namespace: "contact", colour: Colour::channels(FORCE), form };
         let arrows = instant.forces.iter().filter_map(|at| {
             let tail = *instant.nodes.get(at.node as usize)?;
-            Some(marker(Form::Arrow([tail, tail + self.extent.arrow(at.force)], SHAFT * self.extent.radius)))
+            Some(marker(Form::Arrow([tail, tail + self.magnitudes.arrow(at.force)], SHAFT * self.magnitudes.radius)))
         });
         [marker(Form::None)].into_iter().chain(arrows).collect()
     }

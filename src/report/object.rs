@@ -170,7 +170,7 @@ pub fn object(dataset: &Dataset, chain: &Chain, instants: &[Instant]) -> Result<
     let mut entries = vec![
         Entry { name: "proxy node".to_owned(), colour: PROXY_NODE, mark: Mark::Dot },
         Entry {
-            name: format!("force on the arm, longest {} N", ticks::number(scene.extent.force, 2)),
+            name: format!("force on the arm, longest {} N", ticks::number(scene.magnitudes.force, 2)),
             colour: FORCE,
             mark: Mark::Line,
         },
@@ -211,12 +211,12 @@ struct Scene<'a> {
     triangles: &'a [[u32; 3]],
     view: Viewpoint,
     map: ColourMap,
-    extent: Extent,
+    magnitudes: Magnitudes,
 }
 
 /// How large the object and what happens to it are, over some instants.
 #[derive(Clone, Copy)]
-pub(super) struct Extent {
+pub(super) struct Magnitudes {
     /// Middle of the object at rest, and half its diagonal (m).
     pub(super) middle: DVec3,
     pub(super) radius: f64,
@@ -225,7 +225,7 @@ pub(super) struct Extent {
     pub(super) force: f64,
 }
 
-impl Extent {
+impl Magnitudes {
     /// That of an object with nodes `rest` at rest (m), at `instants`.
     pub(super) fn of(rest: &[DVec3], instants: &[Instant]) -> Self {
         let [low, high] = corners(rest);
@@ -249,8 +249,8 @@ impl Extent {
 
 impl<'a> Scene<'a> {
     fn new(chain: &'a Chain, rest: &'a [DVec3], triangles: &'a [[u32; 3]], instants: &[Instant]) -> Self {
-        let extent = Extent::of(rest, instants);
-        let high = if extent.displacement > 0.0 { 1e3 * extent.displacement } else { 1.0 };
+        let magnitudes = Magnitudes::of(rest, instants);
+        let high = if magnitudes.displacement > 0.0 { 1e3 * magnitudes.displacement } else { 1.0 };
         let mut scene = Self {
             chain,
             links: Vec::new(),
@@ -258,26 +258,27 @@ impl<'a> Scene<'a> {
             triangles,
             view: Viewpoint::framing(&[], DVec3::NEG_Y, [1, 1]),
             map: ColourMap::Pale { low: 0.0, high },
-            extent,
+            magnitudes,
         };
         let mut framed: Vec<DVec3> =
             instants.iter().flat_map(|instant| instant.nodes.iter().take(rest.len())).copied().collect();
         for instant in instants {
             // Proxy nodes at the object, not the whole arm.
-            framed.extend(instant.pose.nodes.iter().filter(|x| x.distance(extent.middle) < 1.3 * extent.radius));
+            framed
+                .extend(instant.pose.nodes.iter().filter(|x| x.distance(magnitudes.middle) < 1.3 * magnitudes.radius));
             framed.extend(scene.arrows(instant).into_iter().map(|(_, tip)| tip));
         }
         scene.view =
-            Viewpoint::framing(&framed, view(extent.middle, instants), CELL.map(|side| (side * PIXELS) as usize));
+            Viewpoint::framing(&framed, view(magnitudes.middle, instants), CELL.map(|side| (side * PIXELS) as usize));
         scene
     }
 
     /// Returns tail and tip of the arrow of each force on the arm.
     fn arrows(&self, instant: &Instant) -> Vec<(DVec3, DVec3)> {
         // Those under a fiftieth of the greatest would be specks.
-        let visible = instant.forces.iter().filter(|at| at.force.length() > 0.02 * self.extent.force);
+        let visible = instant.forces.iter().filter(|at| at.force.length() > 0.02 * self.magnitudes.force);
         let tail = |at: &NodeForce| instant.nodes.get(at.node as usize).copied();
-        visible.filter_map(|at| Some((tail(at)?, tail(at)? + self.extent.arrow(at.force)))).collect()
+        visible.filter_map(|at| Some((tail(at)?, tail(at)? + self.magnitudes.arrow(at.force)))).collect()
     }
 
     fn picture(&self, instant: &Instant) -> Picture {
@@ -287,9 +288,10 @@ impl<'a> Scene<'a> {
             self.rest.iter().zip(&instant.nodes).map(|pair| self.map.colour(displacement(pair))).collect();
         let nodes = &instant.nodes[..self.rest.len()];
         raster.mesh(nodes, self.triangles, &colours);
-        draw_proxy(&mut raster, self.chain, &instant.pose, LINK_THICKNESS * self.extent.radius, &self.links);
+        draw_proxy(&mut raster, self.chain, &instant.pose, LINK_THICKNESS * self.magnitudes.radius, &self.links);
         let arrows = self.arrows(instant).into_iter();
-        let arrows = arrows.flat_map(|(tail, tip)| Cone::arrow(tail, tip - tail, 0.022 * self.extent.radius, FORCE));
+        let arrows =
+            arrows.flat_map(|(tail, tip)| Cone::arrow(tail, tip - tail, 0.022 * self.magnitudes.radius, FORCE));
         raster.cones(&arrows.collect::<Vec<_>>());
         raster.edges(nodes, self.triangles, 1.2, EDGE);
         raster.picture()

@@ -16,7 +16,7 @@
 //! | `view_renderer`, `pipelines`, `shapes`, `links`, `pixels` | the renderer of that panel |
 //! | `film` | the 3-D picture over time |
 //! | `slices`, `column`, `cloud`, `plots`, `controls`, `gains`, `files` | the other panels |
-//! | `legend`, `notice`, `steps` | a sample and its name, a message that fades, the first screen |
+//! | `legend`, `notice`, `steps` | samples and choices with their names, a message that fades, the first screen |
 //!
 //! One device computes and draws: the object's nodes go from the frame update to the screen without a read-back. The
 //! haptic thread waits for nothing here; see `feel`.

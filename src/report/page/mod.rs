@@ -8,7 +8,7 @@
 mod pack;
 
 use super::{
-    object::{Extent, FORCE, Instant, LINK, LINK_THICKNESS, PROXY_NODE, links, view},
+    object::{FORCE, Instant, LINK, LINK_THICKNESS, Magnitudes, PROXY_NODE, links, view},
     slices::{Plane, torque_size},
 };
 use crate::{
@@ -114,7 +114,7 @@ impl Body {
 
     fn packed(&self, pack: &mut Pack) -> Value {
         let Self { rest, triangles, chain, shapes, instants } = self;
-        let Extent { middle, radius, displacement: largest, force } = Extent::of(rest, instants);
+        let Magnitudes { middle, radius, displacement: largest, force } = Magnitudes::of(rest, instants);
         let unit = if largest > 0.0 { largest / STEPS } else { 1.0 };
 
         let mut before = vec![0_i16; 3 * rest.len()];
