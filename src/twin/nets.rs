@@ -126,6 +126,17 @@ pub fn surface([low, high]: [DVec3; 2], size: f64, value: impl Fn(DVec3) -> f64 
             }
         }
     }
+    // In the order in which an OBJ file is read: numbers of nodes are then those of the body that is made of it.
+    let mut order: Vec<u32> = Vec::with_capacity(nodes.len());
+    let mut places = vec![None; nodes.len()];
+    for corner in triangles.as_flattened_mut() {
+        let old = *corner;
+        *corner = *places[old as usize].get_or_insert_with(|| {
+            order.push(old);
+            order.len() as u32 - 1
+        });
+    }
+    let [mut nodes, cells] = [nodes, cells].map(|all| order.iter().map(|&old| all[old as usize]).collect::<Vec<_>>());
     relax(&mut nodes, &triangles, (&cells, size), &value);
     (nodes, triangles)
 }

@@ -265,6 +265,8 @@ fn with_twin<T>(
     let (range, given) = (KnownRange::around(&approaches), Given { width: Some(width), cell: None });
     let twin = twin_scene((&scene.text, &path), mesh, (&shape, &range), START, given).unwrap();
     let object = Object::build(&twin.object).unwrap();
+    // What is known of a node of the shape is known of the twin's of the same number. A scene has places to 1e-6 m.
+    assert!(shape.nodes.iter().zip(&object.rest).all(|(own, read)| own.distance(*read) < 2e-6));
     let mut model = Model::new(&object, chain, twin.contact);
     let watched = &mut Watched { stop: &AtomicBool::new(false), progress: &mut |_, _| () };
     let modulus = Modulus::fit(&mut model, START, (&approaches, &shape), watched).unwrap();
@@ -344,8 +346,7 @@ fn the_twin_of_a_ball_is_as_stiff_and_answers_deeper_than_a_line() {
     let found = likeness(&SPHERE, [-0.07, 1e4, 0.02], [[0.157, 0.004], [0.163, -0.008], [0.172, 0.007]], 0.01);
     println!("ball: {found:?}");
     assert!((found.friction - FRICTION).abs() < 0.1);
-    // Its underside was not touched: its twin stands wide.
-    assert!((found.modulus - 1.0).abs() < 0.1 && found.displacement < 0.25);
+    assert!((found.modulus - 1.0).abs() < 0.1 && found.displacement < 0.1);
     assert!(found.torque[1] < 0.15 && found.torque[1] < found.torque[2]);
 }
 
@@ -353,8 +354,10 @@ fn the_twin_of_a_ball_is_as_stiff_and_answers_deeper_than_a_line() {
 fn the_twin_of_a_bean_is_as_stiff_and_moves_alike() {
     let found = likeness(&BEAN, [-0.04, 1.5e4, 0.02], [[0.165, 0.002], [0.157, -0.006], [0.173, 0.006]], 0.008);
     println!("bean: {found:?}");
-    assert!((found.modulus - 1.0).abs() < 0.1 && found.displacement < 0.12 && found.torque[0] < 0.1);
+    assert!((found.modulus - 1.0).abs() < 0.1 && found.displacement < 0.1 && found.torque[0] < 0.1);
     assert!(found.surface < 0.1);
+    // It lies in a bed that holds its sides, which no flat ground does: twice as deep, a line errs less.
+    assert!(found.torque[1] < 0.25);
 }
 
 /// A ball of ten times the slab's stiffness, 3 mm below its top, is seen from outside.
