@@ -108,8 +108,8 @@ impl Level {
         (at - FACE * point.normal).floor().as_ivec3().clamp(IVec3::ZERO, self.counts - 1)
     }
 
-    /// What each cube holds of the inside of the closed surface, if anything. `facing`: the areas of the surface in it across each
-    /// axis.
+    /// What each cube holds of the inside of the closed surface, if anything. `facing`: the areas of the surface in it
+    /// across each axis.
     pub fn fill(&self, nodes: &[DVec3], triangles: &[[u32; 3]], facing: &[DVec3]) -> Vec<Option<Filling>> {
         // Where no surface is, along z.
         let axes: Vec<usize> =
@@ -125,12 +125,38 @@ impl Level {
         inside.into_iter().zip(axes).map(filling).collect()
     }
 
-    /// Adds to `inside` what lies inside the surface, of those cubes whose lines run along `axis`.
-    fn cut(&self, nodes: &[DVec3], triangles: &[[u32; 3]], axis: usize, axes: &[usize], inside: &mut [Vec<Stretch>]) {
-        let counts = along(axis, self.counts.to_array());
-        let lines = counts.map(|count| LINES as i32 * count);
-        let place = |number: i32| f64::from(number / LINES as i32) + line(number as usize % LINES)[0];
-        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); (lines[0] * lines[1]) as usize];
+    /// The narrowest gap that lines cross between two of the surface's `components`, and that cubes bridge: they share one,
+    /// or neighbours. Its middle and its width (m).
+    pub fn bridged(&self, nodes: &[DVec3], triangles: &[[u32; 3]], components: &[Vec<u32>]) -> Option<(DVec3, f64)> {
+        let mut part = vec![0; nodes.len()];
+        for (number, component) in components.iter().enumerate() {
+            component.iter().for_each(|&node| part[node as usize] = number);
+        }
+        let mut narrowest: Option<(DVec3, f64)> = None;
+        for axis in 0..3 {
+            let lines = along(axis, self.counts.to_array())[1] * LINES as i32;
+            for (number, heights) in self.crossings(nodes, triangles, axis).iter().enumerate() {
+                for gap in heights.get(1..).unwrap_or_default().as_chunks().0 {
+                    let [(from, one), (to, other)] = gap.map(|(height, node)| (height, part[node as usize]));
+                    let width = self.size * (to - from);
+                    if one != other
+                        && (to + FACE).floor() - (from - FACE).floor() <= 1.0
+                        && narrowest.is_none_or(|(_, narrowest)| width < narrowest)
+                    {
+                        let [x, y] = [number as i32 / lines, number as i32 % lines].map(line_place);
+                        let middle = DVec3::from_array(across(axis, [x, y, 0.5 * (from + to)]));
+                        narrowest = Some((self.origin + self.size * middle, width));
+                    }
+                }
+            }
+        }
+        narrowest
+    }
+
+    /// Where each line along `axis` crosses the surface, ascending (cubes), and a node of the triangle there.
+    fn crossings(&self, nodes: &[DVec3], triangles: &[[u32; 3]], axis: usize) -> Vec<Vec<(f64, u32)>> {
+        let lines = along(axis, self.counts.to_array()).map(|count| LINES as i32 * count);
+        let mut crossings = vec![Vec::new(); (lines[0] * lines[1]) as usize];
         for triangle in triangles {
             let corners = triangle.map(|node| {
                 DVec3::from_array(along(axis, ((nodes[node as usize] - self.origin) / self.size).to_array()))
@@ -139,16 +165,22 @@ impl Level {
             let low = (a.min(b).min(c).floor().as_ivec3() * LINES as i32).max(IVec3::ZERO);
             let high = ((a.max(b).max(c).floor().as_ivec3() + 1) * LINES as i32).min(IVec3::from_array(lines));
             for (x, y) in (low.x..high.x).flat_map(|x| (low.y..high.y).map(move |y| (x, y))) {
-                if let Some(height) = crossing(corners, DVec2::new(place(x), place(y))) {
-                    crossings[(x * lines[1] + y) as usize].push(height);
+                if let Some(height) = crossing(corners, DVec2::new(line_place(x), line_place(y))) {
+                    crossings[(x * lines[1] + y) as usize].push((height, triangle[0]));
                 }
             }
         }
-        for (number, heights) in crossings.iter_mut().enumerate() {
-            heights.sort_by(f64::total_cmp);
-            let (x, y) = (number as i32 / lines[1], number as i32 % lines[1]);
+        crossings.iter_mut().for_each(|heights: &mut Vec<(f64, u32)>| heights.sort_by(|a, b| a.0.total_cmp(&b.0)));
+        crossings
+    }
+
+    /// Adds to `inside` what lies inside the surface, of those cubes whose lines run along `axis`.
+    fn cut(&self, nodes: &[DVec3], triangles: &[[u32; 3]], axis: usize, axes: &[usize], inside: &mut [Vec<Stretch>]) {
+        let counts = along(axis, self.counts.to_array());
+        for (number, heights) in self.crossings(nodes, triangles, axis).iter().enumerate() {
+            let (x, y) = (number as i32 / (LINES as i32 * counts[1]), number as i32 % (LINES as i32 * counts[1]));
             let own = (x % LINES as i32 * LINES as i32 + y % LINES as i32) as u8;
-            for &[from, to] in heights.as_chunks().0 {
+            for &[(from, _), (to, _)] in heights.as_chunks().0 {
                 let first = (from + FACE).floor().max(0.0) as i32;
                 let last = ((to - FACE).floor() as i32).min(counts[2] - 1);
                 for z in first..=last {
@@ -178,6 +210,11 @@ impl Filling {
         let whole = self.inside.is_none().then(|| (0..(LINES * LINES) as u8).map(|number| (number, [0.0, 1.0])));
         self.inside.iter().flatten().copied().chain(whole.into_iter().flatten())
     }
+}
+
+/// Position across all cubes of line `number` of them (cubes).
+fn line_place(number: i32) -> f64 {
+    f64::from(number / LINES as i32) + line(number as usize % LINES)[0]
 }
 
 /// Coordinates with that along `axis` last.

@@ -214,6 +214,27 @@ impl Object {
             elastic.cell = Some(size);
             suitable_cell = (size > suitable).then_some(suitable);
         }
+        if let Material::Elastic(ElasticSpec { cell: Some(size), .. }) = spec.material
+            && body.tetrahedra.is_empty()
+            && surface.components.len() > 1
+        {
+            let gap =
+                level::Level::around(&body.nodes, size)?.bridged(&body.nodes, &body.triangles, &surface.components);
+            let warning = |(place, width): (DVec3, f64)| {
+                format!(
+                    "cubes of {:.2} mm join parts of the object that are {:.2} mm apart at {}: set object.elasticity.cell to \
+                     less than {:.5}, or take the parts for objects of their own",
+                    1e3 * size,
+                    1e3 * width,
+                    topology::point(place),
+                    width / 2.0
+                )
+            };
+            gap.map(warning).into_iter().for_each(|warning| {
+                log::warn!("{warning}");
+                warnings.push(warning);
+            });
+        }
         let key: Arc<[u8]> = key(&spec, &body).into();
         let Body { nodes, surface_nodes, triangles, tetrahedra, mid_nodes, regions } = body;
         Ok(Self {

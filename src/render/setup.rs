@@ -96,6 +96,8 @@ impl Setup {
         dataset.check_scene().map_err(|what| error!("the dataset contradicts itself: {what}: bake it again"))?;
         let made_motions = own_motion::add(&mut scene, dataset);
         let is_live = source.is_some();
+        // What is solved in every tick is drawn: its stiffness is factorised once.
+        let solved = source.as_ref().and_then(TorqueSource::live).map(|live| live.direct().model().object.clone());
         if let Some(TorqueSource::Twinned(field)) = &source {
             let twin = field.twin().scene();
             (scene.object, scene.graphics) = (Some(twin.object.clone()), twin.graphics);
@@ -107,7 +109,7 @@ impl Setup {
         let is_known = is_live || ContactForces::known(dataset);
         let object = match (&scene.object, &scene.graphics, &dataset.surface) {
             (Some(object), Some(_), Some(surface)) if is_known => {
-                let object = surface.object(object);
+                let object = solved.map_or_else(|| surface.object(object), Ok);
                 Some(object.map_err(|error| error.within("the object in the dataset"))?)
             }
             _ => match scene.graphics.and_then(|graphics| graphics.effects.named()) {

@@ -1,34 +1,36 @@
 //! Bodies of cubes, with all their edges.
 
-use glam::{DVec3, IVec3};
-use std::collections::BTreeMap;
+use glam::DVec3;
+use std::collections::HashMap;
 
-/// The surface of the cubes of side `size` (m) that are `solid`, of `counts` of them along the axes, around the origin:
-/// its nodes and its triangles, two a square, outside to the left.
-pub fn surface(counts: [i32; 3], size: f64, solid: impl Fn(IVec3) -> bool) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let counts = IVec3::from(counts);
-    let inside = |cube: IVec3| cube.cmpge(IVec3::ZERO).all() && cube.cmplt(counts).all() && solid(cube);
-    let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
-    let (mut nodes, mut triangles) = (Vec::new(), Vec::new());
-    let cubes = (0..counts.x).flat_map(|x| (0..counts.y).flat_map(move |y| (0..counts.z).map(move |z| [x, y, z])));
-    for cube in cubes.map(IVec3::from).filter(|&cube| inside(cube)) {
-        for (axis, side) in [0, 1, 2].into_iter().flat_map(|axis| [(axis, 0), (axis, 1)]) {
-            let [out, u, v] = [0, 1, 2].map(|k| IVec3::AXES[(axis + k) % 3]);
-            if inside(cube + (2 * side - 1) * out) {
+/// Nodes (m) and triangles of a surface.
+pub type Shell = (Vec<DVec3>, Vec<[u32; 3]>);
+
+/// The surface of the cubes of size `edge` (m) at the places that `is_filled` names, within `counts` of them; the first one
+/// has its corner at the origin.
+pub fn cubes(counts: [i32; 3], edge: f64, is_filled: impl Fn([i32; 3]) -> bool) -> Shell {
+    let holds = |at: [i32; 3]| (0..3).all(|k| (0..counts[k]).contains(&at[k])) && is_filled(at);
+    let (mut nodes, mut triangles, mut numbers) = (Vec::new(), Vec::new(), HashMap::new());
+    let all = (0..counts[0]).flat_map(|x| (0..counts[1]).flat_map(move |y| (0..counts[2]).map(move |z| [x, y, z])));
+    for at in all.filter(|at| holds(*at)) {
+        for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+            let mut beside = at;
+            beside[axis] += 2 * side - 1;
+            if holds(beside) {
                 continue;
             }
-            let mut corners = [IVec3::ZERO, u, u + v, v].map(|corner| {
-                let at = cube + side * out + corner;
-                *numbers.entry(at.to_array()).or_insert_with(|| {
-                    nodes.push(size * (at.as_dvec3() - 0.5 * counts.as_dvec3()));
+            let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[u, v]| {
+                let mut corner = at;
+                corner[axis] += side;
+                corner[(axis + 1) % 3] += u;
+                corner[(axis + 2) % 3] += v;
+                *numbers.entry(corner).or_insert_with(|| {
+                    nodes.push(edge * DVec3::from_array(corner.map(f64::from)));
                     nodes.len() as u32 - 1
                 })
             });
-            if side == 0 {
-                corners.reverse();
-            }
             let [a, b, c, d] = corners;
-            triangles.extend([[a, b, c], [a, c, d]]);
+            triangles.extend(if side == 1 { [[a, b, c], [a, c, d]] } else { [[a, c, b], [a, d, c]] });
         }
     }
     (nodes, triangles)

@@ -1,6 +1,6 @@
 //! Contact before a rounded surface: exact derivatives, and nothing leaps where the nearest side of a body changes.
 
-use crate::common::cubes;
+use crate::common::cubes::cubes;
 use crate::rest::{contact, gradient_error, greatest_step, tangent_error, work_around};
 use glam::DVec3;
 use haptize::contact::{Model, Solver, Status};
@@ -17,7 +17,8 @@ const LENGTH: f64 = 0.008;
 
 /// A box around the origin.
 pub fn cuboid() -> Object {
-    let (nodes, triangles) = cubes::surface(SIDES.map(|side| (100.0 * side).round() as i32), 0.01, |_| true);
+    let (mut nodes, triangles) = cubes(SIDES.map(|side| (100.0 * side).round() as i32), 0.01, |_| true);
+    nodes.iter_mut().for_each(|node| *node -= 0.5 * DVec3::from_array(SIDES));
     bodies::object(nodes, triangles).unwrap()
 }
 

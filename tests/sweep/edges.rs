@@ -1,7 +1,10 @@
 //! A grid before a thick body with edges, on which a deep node's nearest side changes at once.
 
-use crate::{common::cubes, fixture::Folder};
-use glam::{DVec3, IVec3};
+use crate::{
+    common::cubes::{Shell, cubes},
+    fixture::Folder,
+};
+use glam::DVec3;
 use haptize::{
     scene::Scene,
     sweep::{BackendChoice, Bake},
@@ -9,7 +12,7 @@ use haptize::{
 use std::{f64::consts::TAU, fmt::Write, sync::atomic::AtomicBool};
 
 /// A ring around z, of 25 x 30 mm in section and 37.5 mm in mean radius, in triangles of some 4 mm: nodes (m), triangles.
-fn ring() -> (Vec<DVec3>, Vec<[u32; 3]>) {
+fn ring() -> Shell {
     const AROUND: usize = 56;
     const PARTS: [usize; 2] = [6, 7];
     let side = |i: usize, parts: usize| i as f64 / parts as f64 - 0.5;
@@ -45,16 +48,20 @@ fn rounding_lets_a_grid_follow_a_body_with_edges() {
     let (before, rest) = sphere.split_once("[object.sphere]").unwrap();
     let (_, after) = rest.split_once("[object.skin]").unwrap();
     let after = after.replace("start = -0.916297857297023, count = 36", "start = 0.0, count = 18");
-    let error = |(nodes, triangles): &(Vec<DVec3>, Vec<[u32; 3]>), law: &str| {
+    let error = |(nodes, triangles): &Shell, law: &str| {
         let folder = Folder::new();
         let mut mesh = String::new();
         nodes.iter().for_each(|at| writeln!(mesh, "v {:.7} {:.7} {:.7}", at.x, at.y, at.z).unwrap());
         triangles.iter().for_each(|t| writeln!(mesh, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap());
         std::fs::write(folder.0.path().join("body.obj"), mesh).unwrap();
-        let top = nodes.iter().fold(0.0, |top: f64, at| top.max(at.z));
+        let high = nodes.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let low = nodes.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+        let middle = low.midpoint(high);
         let scene = format!(
-            "{before}[object.mesh]\nfile = \"body.obj\"\ncentre = [0.0, 0.0, {}]\n\n[object.skin]{}",
-            0.05 - top,
+            "{before}[object.mesh]\nfile = \"body.obj\"\ncentre = [{}, {}, {}]\n\n[object.skin]{}",
+            -middle.x,
+            -middle.y,
+            0.05 - high.z,
             after.replace("law = \"following\"", law)
         );
         let scene = Scene::parse(&scene, folder.0.path().join("body.toml").to_str().unwrap()).unwrap();
@@ -65,10 +72,10 @@ fn rounding_lets_a_grid_follow_a_body_with_edges() {
         assert_eq!(dataset.status_counts().unconverged, 0);
         dataset.provenance.error.unwrap().relative().unwrap()
     };
-    let step = |cube: IVec3| cube.x >= 12 || cube.z < 8;
+    let step = |cube: [i32; 3]| cube[0] >= 12 || cube[2] < 8;
     let bodies = [
-        ("box", cubes::surface([20, 16, 12], 0.005, |_| true), 0.025),
-        ("L", cubes::surface([20, 12, 12], 0.005, step), 0.05),
+        ("box", cubes([20, 16, 12], 0.005, |_| true), 0.025),
+        ("L", cubes([20, 12, 12], 0.005, step), 0.05),
         ("ring", ring(), 0.06),
     ];
     for (name, body, most) in &bodies {

@@ -260,7 +260,7 @@ fn joints_that_follow_the_same_one_move_together() {
         ("<limit lower=\"-1.2\" upper=\"1.5\" effort=\"5\" velocity=\"3\"/>", "<limit lower=\"-1\" upper=\"1\"/>");
     let with = |of_bend: &str, of_roll: &str| {
         let mimic = |limits: &str, of: &str| format!("{limits}<mimic joint={of}/>");
-        text.replace(bend, &mimic(bend, of_bend)).replace(roll, &mimic(roll, of_roll))
+        text.replace(bend, &mimic(bend, of_bend)).replacen(roll, &mimic(roll, of_roll), 1)
     };
     let camera = "\"camera_tilt\" multiplier=\"-2\" offset=\"0.1\"";
     let (_, together) = arm(&with(camera, "\"camera_tilt\" offset=\"0.5\""), "probe", &[]).unwrap();

@@ -46,6 +46,24 @@ fn an_l_bends_alike_with_cubes_of_half_a_leg_and_of_a_sixth() {
     assert!(coarse.abs() < 0.05 && fine.abs() < 0.02, "{coarse}, {fine}");
 }
 
+/// Nodes of one cube, or of neighbours, move both parts.
+#[test]
+fn cubes_that_join_parts_are_told_with_the_gap() {
+    let parts = |gap: i32, cell: f64| {
+        let shell = cubes([20 + gap, 10, 10], 0.001, |at| !(10..10 + gap).contains(&at[0]));
+        solid(shell, elastic(0.45, Some(cell)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO).warnings
+    };
+    let told = parts(1, 0.005).join("\n");
+    assert!(told.contains("cubes of 5.00 mm join parts of the object that are 1.00 mm apart at [0.0105"), "{told}");
+    assert!(told.contains("object.elasticity.cell to less than 0.0005"), "{told}");
+    // From two cubes on there is none in the gap that both parts hold.
+    assert_eq!([parts(4, 0.002), parts(11, 0.005)].concat(), Vec::<String>::new());
+    // The inside of a hollow body is a part of its surface, and nothing is apart there.
+    let hollow = cubes([10, 10, 10], 0.002, |at| at.iter().any(|k| !(2..8).contains(k)));
+    let hollow = solid(hollow, elastic(0.45, Some(0.01)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO);
+    assert_eq!(hollow.warnings, Vec::<String>::new());
+}
+
 /// Most that compliance differs by the points that stand for parts of the surface which cubes cut (1): half of its error
 /// with cubes that suit contact, of 2 % (`docs/solids.md`). At a corner of the body it is 0.6 %, elsewhere 2e-5.
 const OF_POINTS: f64 = 0.01;

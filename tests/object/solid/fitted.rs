@@ -4,6 +4,7 @@ use super::accuracy::compliance;
 use super::cells::{HEXAHEDRON, build, written};
 use super::*;
 use haptize::scene::{InclusionPlace, InclusionSpec};
+use std::collections::HashMap;
 
 /// Height of a block of 60 x 60 mm (m).
 const HEIGHT: f64 = 0.03;

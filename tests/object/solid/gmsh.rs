@@ -2,6 +2,7 @@
 
 use super::*;
 use haptize::scene::{Scene, SpringKind, SpringSpec};
+use std::collections::HashMap;
 use std::fmt::Write;
 
 const POISSON: f64 = 0.3;
