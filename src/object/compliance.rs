@@ -8,6 +8,7 @@
 //! nodes is all there is to store and to multiply with, instead of nine.
 
 use super::{Attachment, Factor, Mechanics, Object};
+use crate::scene::{Material, SpringKind, SpringSpec};
 use crate::{Error, cache::Cache, error, memory};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -59,7 +60,8 @@ impl Compliance {
             let mechanics = object.mechanics()?;
             Ok::<_, Error>(entries(&mechanics.factor, &mechanics.attachment, &nodes))
         })?;
-        Ok(Arc::new(Self::from_parts(nodes, object.surface_nodes, rows_per_node(object)?, entries)))
+        let known = object.proven.map_or_else(|| Ok(object.mechanics()?.factor.rows_per_node()), Ok::<_, Error>);
+        Ok(Arc::new(Self::from_parts(nodes, object.surface_nodes, known?, entries)))
     }
 
     /// Whether an earlier run has kept the compliance on all surface nodes of `object`.
@@ -75,12 +77,17 @@ impl Compliance {
         Self { nodes, places, rows_per_node, entries }
     }
 
-    /// Checks that the compliance on `nodes` surface nodes of `object` would fit in memory.
+    /// Checks that the compliance on `nodes` surface nodes of `object` would fit in memory, before anything is formed.
     ///
     /// # Errors
     /// When it would not.
     pub fn check(object: &Object, nodes: usize) -> Result<(), Error> {
-        let order = nodes.saturating_mul(rows_per_node(object)?);
+        let is_isotropic = match object.spec.material {
+            Material::Springs(SpringSpec { kind, .. }) => kind == SpringKind::Isotropic,
+            Material::Elastic(_) => false,
+            Material::Hollow => true,
+        };
+        let order = nodes.saturating_mul(if is_isotropic { 1 } else { 3 });
         let bytes = order.saturating_mul(order).saturating_mul(size_of::<f64>());
         if bytes <= memory::SMALL {
             return Ok(());
@@ -149,11 +156,6 @@ impl Compliance {
 /// Under what the compliance of `object` on `nodes` is kept.
 fn key(object: &Object, nodes: &[u32]) -> Vec<u8> {
     [&object.key[..], b"compliance", bytemuck::cast_slice(nodes)].concat()
-}
-
-/// Rows and columns per node of what `object` resists by.
-fn rows_per_node(object: &Object) -> Result<usize, Error> {
-    object.proven.map_or_else(|| Ok(object.mechanics()?.factor.rows_per_node()), Ok)
 }
 
 /// The entries of N K^-1 N^T at the nodes `covered`, row by row.

@@ -37,7 +37,7 @@ pub(super) fn prove(scene: &Scene, object: &Object) -> Result<(), Error> {
     // Of a larger surface only a part of the compliance is formed, and its size is checked when it is known.
     let is_whole = object.surface_nodes <= Model::WHOLE;
     let check = || if is_whole { Compliance::check(object, object.surface_nodes) } else { Ok(()) };
-    object.prove().and_then(|()| check()).map_err(|source| refused(scene, source))
+    check().and_then(|()| object.prove()).map_err(|source| refused(scene, source))
 }
 
 /// The error of the object of `scene`, with its place there.
