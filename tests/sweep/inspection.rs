@@ -79,7 +79,7 @@ fn every_node_of_a_body_is_known_to_move_as_it_does() {
         assert!(!near.compliance.is_whole());
         let [near, whole] = [&near, &whole].map(|model| Inspection::new(model, &q).unwrap());
         assert_eq!((near.status == "contact", near.dent.is_some()), (touches, touches));
-        assert!(relative_error(&near.torque, &whole.torque) < 1e-12);
+        assert_eq!(near.torque, whole.torque);
         let off = |(a, b): (&ObjectNode, &ObjectNode)| a.position.distance(b.position);
         let moved =
             |of: &Inspection| of.object_nodes.iter().map(|at| at.position.distance(at.rest)).fold(0.0, f64::max);

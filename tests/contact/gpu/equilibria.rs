@@ -35,12 +35,6 @@ const TANGENT_AGREEMENT: f64 = 4e-3;
 /// Agreement of gaps (m): coordinates of up to half a metre rounded a few times by 6e-8.
 const GAP_AGREEMENT: f64 = 3e-7;
 
-/// By how much joints turn where places change by as much as they are rounded in f32, half a metre from the base (rad).
-const PLACES: f64 = 1e-6;
-
-/// Most that forces change meanwhile where none leaps, over the greatest (1): contact is a millimetre deep or more.
-const NO_LEAP: f64 = 1e-2;
-
 /// Greatest differences between the results of both, over the greatest result: of U, torque, forces on the object, and
 /// tangents.
 #[derive(Debug, Default)]
@@ -158,10 +152,11 @@ fn all_scenes_have_the_same_equilibria_on_gpu_and_cpu() {
 fn joints_that_follow_others_have_the_same_equilibria_on_gpu_and_cpu() {
     let (scene, object, chain) = load("sphere.toml");
     let mut joints = chain.joints;
-    // The third joint goes through its range as the second goes through its own.
+    // As the second joint goes through its range, the third goes about its middle, the other way.
     let [turn, lift, bend] = [0, 1, 2].map(|k| joints[k].limits);
-    let multiplier = (bend[1] - bend[0]) / (lift[1] - lift[0]);
-    let offset = bend[0] - multiplier * lift[0];
+    let [middle_lift, middle_bend] = [lift, bend].map(|[least, greatest]| 0.5 * (least + greatest));
+    let multiplier = -0.5;
+    let offset = middle_bend - multiplier * middle_lift;
     joints[2].follows = Some(Follows { joint: joints[1].name.clone(), multiplier, offset });
     let chain = Chain::new(&ProxySpec::new(joints).unwrap());
     let surface = ContactSurface::Smooth;
@@ -169,21 +164,8 @@ fn joints_that_follow_others_have_the_same_equilibria_on_gpu_and_cpu() {
     model.with_tangent = true;
     let mut random = Random::new(3);
     let mut place = |[least, greatest]: [f64; 2]| random.between(least, greatest);
-    let mut configurations: Vec<JointVector> =
+    let configurations: Vec<JointVector> =
         (0..200).map(|_| [turn, lift].map(&mut place).into_iter().collect()).collect();
-    // Where the foot of a deep node leaps, rounding decides on which side it is.
-    let mut solver = Solver::new(&model);
-    let mut forces = |q: &[f64]| by_node(&solver.solve(q), object.surface_nodes);
-    configurations.retain(|q| {
-        let here = forces(q);
-        let size = worst(here.iter().map(|force| force.length()));
-        let stays = |step: f64| {
-            let beside = forces(&q.iter().map(|q| q + step).collect::<Vec<f64>>());
-            worst(here.iter().zip(&beside).map(|(a, b)| a.distance(*b))) <= NO_LEAP * size
-        };
-        [-PLACES, PLACES].into_iter().all(stays)
-    });
-    assert!(configurations.len() > 150, "{}", configurations.len());
     check("followers", &model, &configurations, 20);
 }
 

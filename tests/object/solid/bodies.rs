@@ -54,14 +54,14 @@ fn cubes_that_join_parts_are_told_with_the_gap() {
         solid(shell, elastic(0.45, Some(cell)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO).warnings
     };
     let told = parts(1, 0.005).join("\n");
-    assert!(told.contains("cubes of 5.00 mm join parts of the object that are 1.00 mm apart at [0.0105"), "{told}");
+    assert!(told.contains("cubes of 5.00 mm join parts of the object that are 1.00 mm apart at (0.0105"), "{told}");
     assert!(told.contains("object.elasticity.cell to less than 0.0005"), "{told}");
     // From two cubes on there is none in the gap that both parts hold.
     assert_eq!([parts(4, 0.002), parts(11, 0.005)].concat(), Vec::<String>::new());
     // The inside of a hollow body is a part of its surface, and nothing is apart there.
     let hollow = cubes([10, 10, 10], 0.002, |at| at.iter().any(|k| !(2..8).contains(k)));
     let hollow = solid(hollow, elastic(0.45, Some(0.01)), clamped(1e-6), DMat3::IDENTITY, DVec3::ZERO);
-    assert_eq!(hollow.warnings, Vec::<String>::new());
+    assert!(hollow.warnings.iter().all(|warning| !warning.contains("join")), "{:?}", hollow.warnings);
 }
 
 /// Most that compliance differs by the points that stand for parts of the surface which cubes cut (1): half of its error
