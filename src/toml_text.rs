@@ -15,7 +15,7 @@ pub fn entry(text: &mut String, key: &str, value: &str, meaning: &str) -> std::f
     if meaning.is_empty() {
         writeln!(text, "{assignment}")
     } else {
-        writeln!(text, "{assignment:<40}# {}", comment(meaning))
+        writeln!(text, "{assignment:<39} # {}", comment(meaning))
     }
 }
 

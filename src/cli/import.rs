@@ -106,13 +106,15 @@ impl Describe for Imported {
         ));
         for (joint, count) in joints.iter().zip(nodes) {
             let ([lower, upper], kind) = (joint.limits, format!("{:?}", joint.kind).to_lowercase());
+            let follows = joint.follows.iter().map(|mimic| format!(", follows {}", mimic.joint)).collect::<String>();
             text.row(
                 &joint.name,
-                format_args!("{kind:9} {lower:8.3} to {upper:.3}, {}", counted(*count, ["node", "nodes"])),
+                format_args!("{kind:9} {lower:8.3} to {upper:.3}, {}{follows}", counted(*count, ["node", "nodes"])),
             );
         }
         // More joints than a grid has axes are felt live.
-        let command = if joints.len() > MAX_AXES { "view" } else { "bake" };
+        let independent = joints.iter().filter(|joint| joint.follows.is_none()).count();
+        let command = if independent > MAX_AXES { "view" } else { "bake" };
         text.row("next", format_args!("haptize {command} {}", shell::file(Path::new(file))));
     }
 }

@@ -3,6 +3,7 @@
 // clippy.toml allows it inside #[test] functions only; helpers need it, too.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod arm;
 mod commands;
 #[path = "../common/mod.rs"]
 mod common;

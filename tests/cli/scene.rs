@@ -5,7 +5,7 @@ use haptize::scene::{
     ContactLaw, ContactSurface, GraphicsEffects, GraphicsSpec, GroundNodes, Interpolation, JointKind, Material,
     Rendering, Scene, Shape,
 };
-use haptize::{Error, ErrorKind, JointVector, MAX_AXES, MAX_JOINTS};
+use haptize::{Error, ErrorKind, JointVector};
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -20,7 +20,7 @@ fn shipped(name: &str) -> Scene {
 }
 
 /// The least that a scene must say.
-const LEAST: &str = r#"
+pub const LEAST: &str = r#"
 [object.sphere]
 radius = 0.05
 rings = 4
@@ -41,12 +41,12 @@ stiffness = 1000
 spacing = 0.1
 "#;
 
-fn parse(text: &str) -> Result<Scene, Error> {
+pub fn parse(text: &str) -> Result<Scene, Error> {
     Scene::parse(text, "folder/least.toml")
 }
 
 /// The error of a scene that is not valid, and its line and column.
-fn refused(text: &str) -> (Error, (usize, usize)) {
+pub fn refused(text: &str) -> (Error, (usize, usize)) {
     let error = parse(text).expect_err(text);
     assert_eq!(error.kind(), ErrorKind::Scene, "{error}");
     let place = error.location().unwrap().line.unwrap();
@@ -167,44 +167,6 @@ fn default_gains_meet_the_passivity_conditions() {
             assert!(h.device_damping[j] >= h.coupling_stiffness[j] / (2.0 * h.rate) + h.coupling_damping[j]);
         }
     }
-}
-
-#[test]
-fn a_follower_narrows_the_range_of_the_joint_that_it_follows_and_follows_no_follower() {
-    let with = |follows: &str| {
-        let joint = "[[proxy.joint]]\nkind = \"prismatic\"\naxis = [1, 0, 0]\nlimits = [0, 0.1]";
-        LEAST.replace("[contact]", &format!("{joint}\nfollows = {{ {follows} }}\n[contact]"))
-    };
-    let proxy = parse(&with("joint = \"q1\", multiplier = -0.25, offset = 0.05")).unwrap().proxy;
-    assert_eq!((proxy.joints.len(), proxy.joints[0].limits), (1, [-0.2, 0.2]));
-    let [follower] = &proxy.followers[..] else { panic!("{proxy:?}") };
-    assert_eq!((follower.leader, follower.link, follower.spec.rotor_inertia), (0, 1, 0.0));
-    for (follows, words) in [
-        ("joint = \"q9\"", "no joint \"q9\" that moves independently: name one of q1"),
-        ("joint = \"q2\"", "no joint \"q2\" that moves independently"),
-        ("joint = \"q1\", multiplier = 0", "multiplier is 0"),
-        ("joint = \"q1\", multiplier = inf", "finite"),
-        ("joint = \"q1\", offset = 3", "widen limits"),
-        ("joint = \"q1\", factor = 3", "unknown field `factor`"),
-        ("multiplier = 2", "missing field `joint`"),
-    ] {
-        let text = with(follows);
-        let (error, (line, _)) = refused(&text);
-        assert!(text.lines().nth(line - 1).unwrap().starts_with("follows"), "{error}");
-        assert!(error.to_string().contains(words), "{follows}: {error}");
-    }
-    let alone = LEAST.replace("limits = [-1, 1]", "limits = [-1, 1]\nfollows = { joint = \"q1\" }");
-    assert!(refused(&alone).0.to_string().contains("let one joint follow none"));
-}
-
-#[test]
-fn lines_of_nodes_include_both_ends() {
-    let text =
-        LEAST.replace("{ at = [0.1, 0, 0] }", "{ from = [0, 0, 0], to = [0, 0, 0.3], count = 4, radius = 0.01 }");
-    let nodes = parse(&text).unwrap().proxy.joints[0].nodes.clone();
-    let heights: Vec<f64> = nodes.iter().map(|node| node.position.z).collect();
-    assert!(heights.iter().zip([0.0, 0.1, 0.2, 0.3]).all(|(a, b)| (a - b).abs() < 1e-15) && heights.len() == 4);
-    assert!(nodes.iter().all(|node| node.radius == 0.01));
 }
 
 /// A dataset holds its scene: one that was solved by a removed law still opens.
@@ -525,34 +487,6 @@ fn long_lines_and_control_characters_do_not_reach_the_terminal() {
     let shown = refused(&far).0.to_string();
     assert!(shown.len() < 1000 && shown.contains('^'), "{shown}");
     assert_eq!(refused("[object").1.0, 1);
-}
-
-#[test]
-fn the_number_of_joints_is_one_to_twelve_and_six_with_a_grid() {
-    let joint = "[[proxy.joint]]\nkind = \"revolute\"\naxis = [0, 0, 1]\nlimits = [0, 0.5]\n";
-    let arm = |extra: usize| LEAST.replace("[contact]", &format!("{}[contact]", joint.repeat(extra)));
-    assert_eq!(parse(&arm(5)).unwrap().proxy.joints.len(), MAX_AXES);
-    let refused = parse(&arm(6)).unwrap_err().to_string();
-    assert!(
-        refused.contains("at most 6 axes, and the arm has 7 joints") && refused.contains("haptize play"),
-        "{refused}"
-    );
-    let free = |extra: usize| parse(&arm(extra).replace("[grid]\nspacing = 0.1", ""));
-    assert_eq!(free(11).unwrap().proxy.joints.len(), MAX_JOINTS);
-    assert!(free(12).unwrap_err().to_string().contains("13 joints: it must have 1 to 12"));
-    let none = LEAST.replace("[[proxy.joint]]", "[proxy]\njoint = []\n[unused]");
-    assert!(parse(&none).is_err());
-    let empty = "[proxy]\njoint = []\n".to_owned();
-    let (start, end) = (LEAST.find("[[proxy").unwrap(), LEAST.find("[contact]").unwrap());
-    let none = format!("{}{empty}{}", &LEAST[..start], &LEAST[end..]);
-    assert!(parse(&none).unwrap_err().to_string().contains("0 joints"));
-}
-
-#[test]
-fn joints_of_the_same_name_are_refused() {
-    let joint = "[[proxy.joint]]\nname = \"q1\"\nkind = \"revolute\"\naxis = [0, 0, 1]\nlimits = [0, 0.5]\n";
-    let error = parse(&LEAST.replace("[contact]", &format!("{joint}[contact]"))).unwrap_err().to_string();
-    assert!(error.contains("two joints are called \"q1\""), "{error}");
 }
 
 #[test]

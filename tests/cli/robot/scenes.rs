@@ -23,7 +23,12 @@ fn felt(robot: &str, tip: &str, spacing: &str) -> serde_json::Value {
 
 #[test]
 fn imported_arms_bake_and_are_felt_as_they_are() {
-    for (robot, tip, spacing) in [("finger.urdf", "distal", "0.005"), ("arm.urdf", "probe", "0.008")] {
+    for (robot, tip, spacing) in [
+        ("finger.urdf", "distal", "0.005"),
+        ("arm.urdf", "probe", "0.008"),
+        ("palletiser.urdf", "tool", "0.008"),
+        ("palletiser.xml", "tool", "0.008"),
+    ] {
         let played = felt(robot, tip, spacing);
         let number = |key: &str| played[key].as_f64().unwrap();
         assert!(played["fault"].is_null() && number("faults") == 0.0, "{played:#}");
@@ -31,6 +36,21 @@ fn imported_arms_bake_and_are_felt_as_they_are() {
         assert!(number("max_device_torque") > 0.02, "{played:#}");
         assert!(number("max_account_residual") < 1e-10, "{played:#}");
     }
+}
+
+#[test]
+fn a_joint_that_follows_another_is_told_and_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = file("palletiser.urdf").display().to_string();
+    let told = succeed(folder.path(), &["import", &robot, "--tip", "tool", "-o", "level.toml"]);
+    assert!(
+        told.lines().any(|line| line.trim_start().starts_with("level ") && line.ends_with(", follows lift")),
+        "{told}"
+    );
+    let text = std::fs::read_to_string(folder.path().join("level.toml")).unwrap();
+    let follows =
+        "\nfollows = { joint = \"lift\", multiplier = -1.0, offset = 0.1 } # rad = multiplier * that one's + offset\n";
+    assert!(text.contains(follows), "{text}");
 }
 
 #[test]
