@@ -26,8 +26,7 @@ pub fn named(setup: &Setup, dataset: &Dataset, name: &str, topic: Option<&str>) 
             return Ok(motion);
         }
         file => {
-            let known = "the scene in the dataset may name the motions `press` and `scrape`; a CSV or MCAP file gives \
-                         any other";
+            let known = "the scene may name the motions `press` and `scrape`; a CSV or MCAP file gives any other";
             return Err(format!("{file}: cannot be read: there is no such file; {known}").into());
         }
     };
